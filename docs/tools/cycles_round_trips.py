@@ -40,7 +40,7 @@ def answers(
     root
         The checkout.
     """
-    from reference.scene.read import read_truth
+    from reference.scene.read import read_reference
     from validation.engine.diagnose import diagnose_file
     from validation.engine.prediction import SceneLight
     from validation.scenes.loading import load_scene
@@ -51,7 +51,7 @@ def answers(
     else:
         faults = _listed(python, root)
         render_faults(python, scene, folder, samples=samples, size=_SIZE, root=root)
-    light = SceneLight(read_truth(load_scene(scene, _SIZE).scene))
+    light = SceneLight(read_reference(load_scene(scene, _SIZE).scene))
     for fault, said in faults.items():
         path = folder / f"{fault}.exr"
         if not path.exists():

@@ -28,7 +28,7 @@ from reports.data.reader import read_report
 from reports.machine.environment import MissingError, activate, versions
 from reports.plotting.pictures import error_map, error_scale, preview, tone_curve
 from reports.tables.table import number
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
@@ -179,7 +179,7 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
     # The reference of a light with extent takes minutes: a third of the pixels along each side, drawn larger.
     coarser = COARSER if read_scene(load_scene(picture.scene, (8, 6)).scene).area_lights else 1
     loaded, frame = _frame(picture, (SMALL[0] // coarser, SMALL[1] // coarser))
-    truth = truth_image(loaded.scene).airlight
+    truth = reference_image(loaded.scene).airlight
     error = error_metrics(truth, frame.airlight).relative_rmse
     colours = error_map(truth, np.asarray(frame.airlight, dtype=np.float64))
     chosen = configuration(picture.method, None, parse_settings(picture.settings))

@@ -302,7 +302,7 @@ def main() -> None:
     activate()
     import tempfile
 
-    from reference.scene.read import read_truth
+    from reference.scene.read import read_reference
     from reference.storage.exr import Image
     from reference.storage.files import write_text
     from validation.engine.diagnose import diagnose_image
@@ -315,7 +315,7 @@ def main() -> None:
             path = Path(folder) / "scene.xml"
             path.write_text(scene_xml(engine), encoding="utf-8")
             loaded = load_scene(str(path), _SIZE)
-            scenes[engine] = loaded, SceneLight(read_truth(loaded.scene))
+            scenes[engine] = loaded, SceneLight(read_reference(loaded.scene))
     old = json.loads(RECORD.read_text(encoding="utf-8"))["rows"] if RECORD.exists() else []
     rows = {row["number"]: row for row in old}
     for number, (engine, planted, words, given) in enumerate(CASES):

@@ -44,8 +44,8 @@ from reference.quadrature.replicates import (
 )
 from reference.quadrature.surface import Reflection, SurfaceHits
 from reference.quadrature.unbounded import Terms, cosine_profile, sums_of
-from reference.scene.area_light import TruthAreaLight
-from reference.scene.read import TruthScene
+from reference.scene.area_light import ReferenceAreaLight
+from reference.scene.read import ReferenceScene
 from reference.visibility.before_light import IN_PLANE, before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.certificate import LitIntervals, RandomChecks
@@ -76,13 +76,13 @@ class AreaAirlight:
 class Beam:
     """An area light and what can stand in it."""
 
-    light: TruthAreaLight
-    scene: TruthScene  #: without the light's own shape
+    light: ReferenceAreaLight
+    scene: ReferenceScene  #: without the light's own shape
     distance: Array  #: of its rays to the visible surface, (rays,) [m]
     known: Callable[[], Obstacles]  #: looked for once, where somebody asks
 
 
-def beams_of(truth: TruthScene, distance: Array) -> list[Beam]:
+def beams_of(truth: ReferenceScene, distance: Array) -> list[Beam]:
     """Return the area lights of a scene, and what can stand between them and its rays up to distances [m]."""
     beams = []
     for light in truth.area:
@@ -93,7 +93,7 @@ def beams_of(truth: TruthScene, distance: Array) -> list[Beam]:
 
 
 def area_airlight(
-    truth: TruthScene,
+    truth: ReferenceScene,
     beams: list[Beam],
     known: Array,
     *,
@@ -201,7 +201,7 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
 
 
 def area_surface(
-    truth: TruthScene,
+    truth: ReferenceScene,
     hits: SurfaceHits,
     beams: list[Beam],
     known: Array,

@@ -34,7 +34,7 @@ from reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, me
 from reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
 from reference.quadrature.unbounded import TERMS, Stretches, Terms, strongest
 from reference.scene.convex_bounds import Bounds, Sphere
-from reference.scene.read import TruthScene, homogeneous_around
+from reference.scene.read import ReferenceScene, homogeneous_around
 from reference.visibility.line_crossings import crossed_facets, crossings, sphere_crossings
 from reference.visibility.planes import Rays
 
@@ -48,7 +48,7 @@ _RAYS = 4096  # rays at once
 class Bounded:
     """Homogeneous media in disjoint convex bounds, and what surrounds them; a field (`reference.quadrature.fields`)."""
 
-    truth: TruthScene
+    truth: ReferenceScene
 
     @property
     def strongest(self) -> Array:
@@ -83,7 +83,7 @@ class Bounded:
 
 
 def smooth_pieces(
-    truth: TruthScene, rays: Rays, segments: Segments, stretches: Stretches
+    truth: ReferenceScene, rays: Rays, segments: Segments, stretches: Stretches
 ) -> tuple[Pieces, list[Kinks]]:
     """Cut lit stretches at the bounds of media and at the kinks of shadow segments and of phase functions.
 
@@ -100,7 +100,7 @@ def smooth_pieces(
     return cut_pieces(truth, rays, segments, stretches, (ray, x)), found
 
 
-def _kinks_of_phases(truth: TruthScene, rays: Rays, used: Index) -> list[Kinks]:
+def _kinks_of_phases(truth: ReferenceScene, rays: Rays, used: Index) -> list[Kinks]:
     """Return rays, among those used, and distances of the kinks of phase functions."""
     every = []
     for phase in {id(medium.phase): medium.phase for medium in (truth.medium, *truth.media)}.values():
@@ -113,7 +113,7 @@ def _kinks_of_phases(truth: TruthScene, rays: Rays, used: Index) -> list[Kinks]:
 class _Integrand:
     """exp(-tau) p on the pieces of one block of rays (`reference.quadrature.adaptive_panels.Integrand`)."""
 
-    truth: TruthScene
+    truth: ReferenceScene
     pieces: Pieces
     own: Rays  # the ray of each piece
     kinks: list[Kinks]  # of each bounded medium, see `smooth_pieces`

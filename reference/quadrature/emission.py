@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.fields import optical_depth
-from reference.scene.area_light import TruthAreaLight
+from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.device import as_rows, vectors
-from reference.scene.read import TruthScene, scene_from
+from reference.scene.read import ReferenceScene, scene_from
 from reference.visibility.line_crossings import half_chord
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ _PAST = 1e-5  # of a distance, and [m]: how far beyond a crossing of a mesh the 
 _FAR = 1e30  # beyond all bounds of media [m]
 
 
-def emitted_light(truth: TruthScene, distance: Array) -> Array:
+def emitted_light(truth: ReferenceScene, distance: Array) -> Array:
     """Return the radiance of lights with extent before the visible surface, and of the background where there is none.
 
     In W/(m^2 sr), (rays, 3).
@@ -46,7 +46,7 @@ def emitted_light(truth: TruthScene, distance: Array) -> Array:
     return total
 
 
-def _mesh_distances(light: TruthAreaLight, truth: TruthScene) -> Iterator[Array]:
+def _mesh_distances(light: ReferenceAreaLight, truth: ReferenceScene) -> Iterator[Array]:
     """Yield where rays meet a mesh from the side that emits, crossing after crossing, (rays,) [m]; else NaN."""
     mesh = scene_from([light.shape])
     start, walking = np.zeros(len(truth.direction)), np.ones(len(truth.direction), bool)
@@ -60,7 +60,7 @@ def _mesh_distances(light: TruthAreaLight, truth: TruthScene) -> Iterator[Array]
         start = np.where(walking, at * (1 + _PAST) + _PAST, start)
 
 
-def _distance(light: TruthAreaLight, truth: TruthScene) -> Array:
+def _distance(light: ReferenceAreaLight, truth: ReferenceScene) -> Array:
     """Return where rays meet the side of a light that emits, (rays,) [m]; NaN where they do not."""
     origin, direction = truth.origin, truth.direction
     away = light.centre - origin

@@ -19,7 +19,7 @@ from reference.quadrature.height_fog import HeightField
 from reference.quadrature.unbounded import TERMS, Stretches, Terms, Unbounded
 from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthScene, homogeneous_around
+from reference.scene.read import ReferenceScene, homogeneous_around
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Field(Protocol):
         """
 
 
-def field_of(truth: TruthScene) -> Field:
+def field_of(truth: ReferenceScene) -> Field:
     """Return what fills a scene."""
     if isinstance(truth.medium, HeightMedium):
         return HeightField(truth.medium)
@@ -60,6 +60,6 @@ def field_of(truth: TruthScene) -> Field:
     return Bounded(truth) if truth.media else Unbounded(homogeneous_around(truth))
 
 
-def optical_depth(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+def optical_depth(truth: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
     """Return the optical depth of parts of straight lines in a scene; see `Field.optical_depth`."""
     return field_of(truth).optical_depth(origin, direction, low, high)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.ray_values import Progress, RayValues, TruthImage, ray_values
+from reference.quadrature.ray_values import Progress, RayValues, ReferenceImage, ray_values
 from reference.quadrature.replicates import (
     PILOT,
     REPLICATES,
@@ -27,7 +27,7 @@ from reference.quadrature.replicates import (
 )
 from reference.quadrature.unbounded import sums_of
 from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from reference.scene.shapes import read_shapes
 from reference.visibility.certificate import RandomChecks
 
@@ -40,7 +40,7 @@ _CHUNK = 1 << 17  # rays at once
 
 
 def quadrature_image(
-    truth: TruthScene,
+    truth: ReferenceScene,
     *,
     checks: int = 32,
     shadow_scale: float = 1.0,
@@ -49,7 +49,7 @@ def quadrature_image(
     progress: Progress | None = None,
     plan: PointPlan | None = None,
     keep: Keep | None = None,
-) -> TruthImage:
+) -> ReferenceImage:
     """Compute the reference of an image.
 
     `truth`: the scene; `checks`: random shadow rays to each ray and light, which check the lit intervals;
@@ -61,8 +61,8 @@ def quadrature_image(
     `airlight_se` and `surface_se` say what was reached. `progress`: called with (done, total, what) as the work goes
     on; `plan`: how many samples stand for area lights, along rays through pixel centres; `keep`: called with the name
     of each part of that work and a function that does it: it may keep what it returns, and give it back when the same
-    image is computed again. Not for means over pixels. Returns TruthImage: radiances, (height, width, 3) [W/(m^2 sr)],
-    and what is known of their errors. Raises InputError for another word in `pixel`.
+    image is computed again. Not for means over pixels. Returns ReferenceImage: radiances, (height, width, 3)
+    [W/(m^2 sr)], and what is known of their errors. Raises InputError for another word in `pixel`.
 
     Valid for homogeneous media, point and spot lights, area lights, opaque surfaces; for directional lights where all
     media have bounds. Their shadow segments have no end, so `shadow_scale` leaves them as they are. A pixel whose
@@ -78,7 +78,9 @@ def quadrature_image(
     return _image(truth, values, layers, values.bound, values.replicates if truth.is_sampled else None)
 
 
-def _image(truth: TruthScene, centre: RayValues, layers: Array, bound: Array, replicates: Array | None) -> TruthImage:
+def _image(
+    truth: ReferenceScene, centre: RayValues, layers: Array, bound: Array, replicates: Array | None
+) -> ReferenceImage:
     """Return the image of layers, (pixels, 6 or 9); distances, angles and checks are those of the centres."""
     shape, checked = (truth.height, truth.width), centre.random_checks
     extra: dict[str, Any] = {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
@@ -86,7 +88,7 @@ def _image(truth: TruthScene, centre: RayValues, layers: Array, bound: Array, re
         errors = standard_error(replicates[:, :6]).reshape(*shape, 6)
         extra |= {"airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
         extra["replicate_means"] = replicates[:, :6].mean(axis=0).reshape(2, 3, -1).swapaxes(1, 2)
-    return TruthImage(
+    return ReferenceImage(
         layers[:, :3].reshape(*shape, 3),
         bound.reshape(*shape, 3),
         layers[:, 3:6].reshape(*shape, 3),
@@ -103,8 +105,8 @@ def _image(truth: TruthScene, centre: RayValues, layers: Array, bound: Array, re
 
 
 def _means(
-    truth: TruthScene, tolerance: float, plan: PointPlan | None, progress: Progress | None, how: dict[str, Any]
-) -> TruthImage:
+    truth: ReferenceScene, tolerance: float, plan: PointPlan | None, progress: Progress | None, how: dict[str, Any]
+) -> ReferenceImage:
     """Return the means over the areas of all pixels."""
     size, shapes = (truth.width, truth.height), read_shapes(truth.occluders)
     corner = pixel_centres(size) - 0.5

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from reference.quadrature.fields import field_of
 from reference.quadrature.unbounded import Stretches, Terms, lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.candidates import Ball
 from reference.visibility.certificate import LitIntervals, coordinates
@@ -46,7 +46,7 @@ class LitRays:
 
 
 def light_airlight(
-    truth: TruthScene, light: TruthLight, distance: Array, *, shadow_scale: float = 1.0, **how: Any
+    truth: ReferenceScene, light: ReferenceLight, distance: Array, *, shadow_scale: float = 1.0, **how: Any
 ) -> LightAirlight:
     """Compute the airlight of one point or spot light along every ray.
 
@@ -63,7 +63,12 @@ def light_airlight(
 
 
 def lit_sums(
-    truth: TruthScene, light: TruthLight, rays: Rays, lit: LitIntervals, distance: Array, shadow_scale: float = 1.0
+    truth: ReferenceScene,
+    light: ReferenceLight,
+    rays: Rays,
+    lit: LitIntervals,
+    distance: Array,
+    shadow_scale: float = 1.0,
 ) -> tuple[Array, Array]:
     """Return the airlight of a point or spot light from the lit intervals of rays, and its bound, (rays, 3) each."""
     stretches = lit_stretches(light, rays, lit)
@@ -73,8 +78,8 @@ def lit_sums(
 
 
 def lit_rays(
-    truth: TruthScene,
-    light: TruthLight,
+    truth: ReferenceScene,
+    light: ReferenceLight,
     distance: Array,
     *,
     shapes: Shapes | None = None,
@@ -100,7 +105,7 @@ def lit_rays(
     return LitRays(rays, lit, distance, known.shapes, ends[1])
 
 
-def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: Array, **how: Any) -> LightAirlight:
+def directional_airlight(truth: ReferenceScene, light: DirectionalLight, distance: Array, **how: Any) -> LightAirlight:
     """Compute the airlight of one directional light along every ray; see `light_airlight`."""
     found = lit_parallel_rays(truth, light, distance, **how)
     rays, lit = found.rays, found.lit
@@ -116,7 +121,7 @@ def directional_airlight(truth: TruthScene, light: DirectionalLight, distance: A
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
 
 
-def sun_stretches(truth: TruthScene, found: LitRays) -> Stretches:
+def sun_stretches(truth: ReferenceScene, found: LitRays) -> Stretches:
     """Return which parts of rays a directional light reaches; the last may end where its ray leaves the media."""
     lit = found.lit
     # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
@@ -127,7 +132,7 @@ def sun_stretches(truth: TruthScene, found: LitRays) -> Stretches:
 
 
 def lit_parallel_rays(
-    truth: TruthScene, light: DirectionalLight, distance: Array, *, shapes: Shapes | None = None, checks: int = 32
+    truth: ReferenceScene, light: DirectionalLight, distance: Array, *, shapes: Shapes | None = None, checks: int = 32
 ) -> LitRays:
     """Return which parts of the rays a directional light reaches; see `lit_rays`."""
     rays = rays_at(truth.origin, truth.direction, -light.direction, w=0)
@@ -141,7 +146,7 @@ def lit_parallel_rays(
     return LitRays(rays, lit, distance, known.shapes, end)
 
 
-def worth_of_doubt(truth: TruthScene, rays: Rays, lit: LitIntervals) -> Array:
+def worth_of_doubt(truth: ReferenceScene, rays: Rays, lit: LitIntervals) -> Array:
     """Return the most that what shadow rays left in doubt can be worth for a light of strength 1, (rays, 3).
 
     In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one, and the phase

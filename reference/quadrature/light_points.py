@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.mesh_choice import choose_by_area, places_in
-from reference.scene.area_light import TruthAreaLight
-from reference.scene.read import TruthLight
+from reference.scene.area_light import ReferenceAreaLight
+from reference.scene.read import ReferenceLight
 
 Array = NDArray[np.float64]
 
 
-def light_points(light: TruthAreaLight, square: Array) -> Sequence[TruthLight]:
+def light_points(light: ReferenceAreaLight, square: Array) -> Sequence[ReferenceLight]:
     """Return the points of a light as lights whose mean is the light.
 
     `light`: the light; `square`: points of the unit square, (n, 2) [1]. Returns each with the intensity radiance times
@@ -41,7 +41,7 @@ def light_points(light: TruthAreaLight, square: Array) -> Sequence[TruthLight]:
         normals = np.broadcast_to(light.normal, places.shape)
     intensity, quarter = light.radiance * light.area, 0.5 * np.pi
     return [
-        TruthLight(place, intensity, normal, cutoff=quarter, beam=quarter, cosine=True)
+        ReferenceLight(place, intensity, normal, cutoff=quarter, beam=quarter, cosine=True)
         for place, normal in zip(places, normals, strict=True)
     ]
 

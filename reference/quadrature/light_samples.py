@@ -48,7 +48,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.mesh_choice import Choice, choose_for_points, choose_for_rays, places_in
-from reference.scene.area_light import TruthAreaLight
+from reference.scene.area_light import ReferenceAreaLight
 from reference.visibility.before_light import IN_PLANE
 from reference.visibility.certificate import LitIntervals
 
@@ -161,7 +161,7 @@ def _axes(origin: Array, axis: Array, centre: Array) -> _Axes:
 
 
 def samples_for_rays(
-    light: TruthAreaLight, origin: Array, direction: Array, distance: Array, square: Array
+    light: ReferenceAreaLight, origin: Array, direction: Array, distance: Array, square: Array
 ) -> LightSamples:
     """Return samples of a light for the airlight of rays.
 
@@ -177,7 +177,7 @@ def samples_for_rays(
     return LightSamples(place, np.broadcast_to(light.normal, place.shape), weight)
 
 
-def sections_for_points(light: TruthAreaLight, place: Array, square: Array, turn: float = 0.0) -> Sections:
+def sections_for_points(light: ReferenceAreaLight, place: Array, square: Array, turn: float = 0.0) -> Sections:
     """Return sections of a light for surface points that lie before it, point by point, even in the solid angle.
 
     `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square, (samples, 2) [1], the
@@ -303,7 +303,7 @@ class _Fan:
         return np.concatenate([nodes.reshape(len(a), -1), last[:, None]], axis=1)
 
 
-def _fan(light: TruthAreaLight, axes: _Axes) -> _Fan:
+def _fan(light: ReferenceAreaLight, axes: _Axes) -> _Fan:
     rows = len(axes.along)
     normal = axes.components(np.broadcast_to(light.normal, (rows, 1, 3)))[:, 0]
     if light.kind == "disk":
@@ -412,7 +412,7 @@ def _by_table(nodes: Array, density, uniform: Array) -> tuple[Array, Array]:
 # --- Spheres ---
 
 
-def _on_sphere(light: TruthAreaLight, axes: _Axes, distance: Array, square: Array) -> LightSamples:
+def _on_sphere(light: ReferenceAreaLight, axes: _Axes, distance: Array, square: Array) -> LightSamples:
     """Return samples of a sphere by azimuth and by the angle on the circle in which a half plane cuts it.
 
     Both are periodic where the line misses the sphere. Where it does not, the circle ends at the line, and where the
@@ -445,7 +445,7 @@ def _on_sphere(light: TruthAreaLight, axes: _Axes, distance: Array, square: Arra
     return LightSamples(place, (place - light.centre) / radius, radius * h * (high - low) * rate)
 
 
-def _in_cone(light: TruthAreaLight, place: Array, square: Array) -> Sections:
+def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections:
     """Return short sections of a sphere for points outside of it, even in the cone of directions that meet it."""
     way = light.centre - place
     d = np.linalg.norm(way, axis=1)[:, None]

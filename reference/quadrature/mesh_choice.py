@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.area_light import TruthAreaLight, triangle_normals
+from reference.scene.area_light import ReferenceAreaLight, triangle_normals
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -41,7 +41,9 @@ class Choice:
     near: NDArray[np.bool_]  #: whether it is so close to its ray, or point, that its points differ in what they send
 
 
-def choose_for_rays(light: TruthAreaLight, origin: Array, direction: Array, distance: Array, square: Array) -> Choice:
+def choose_for_rays(
+    light: ReferenceAreaLight, origin: Array, direction: Array, distance: Array, square: Array
+) -> Choice:
     """Choose triangles for samples of rays; the parameters are those of `light_samples.samples_for_rays`."""
     mesh = _Mesh(light)
     way = mesh.centre - origin
@@ -64,7 +66,7 @@ def choose_for_rays(light: TruthAreaLight, origin: Array, direction: Array, dist
     return mesh.chosen(worth, square_height, square)
 
 
-def choose_for_points(light: TruthAreaLight, place: Array, square: Array) -> Choice:
+def choose_for_points(light: ReferenceAreaLight, place: Array, square: Array) -> Choice:
     """Choose triangles for samples of surface points; the parameters are those of `samples_for_points`."""
     mesh = _Mesh(light)
     way = place[:, None] - mesh.centre
@@ -74,7 +76,7 @@ def choose_for_points(light: TruthAreaLight, place: Array, square: Array) -> Cho
     return mesh.chosen(worth, r2, square)
 
 
-def choose_by_area(light: TruthAreaLight, square: Array) -> Choice:
+def choose_by_area(light: ReferenceAreaLight, square: Array) -> Choice:
     """Choose triangles for samples that are to serve all rays, in proportion to their power."""
     mesh = _Mesh(light)
     return mesh.chosen(np.zeros((1, len(mesh.area))), np.full((1, len(mesh.area)), np.inf), square)
@@ -83,7 +85,7 @@ def choose_by_area(light: TruthAreaLight, square: Array) -> Choice:
 class _Mesh:
     """The groups of neighbours among the triangles of a light."""
 
-    def __init__(self, light: TruthAreaLight):
+    def __init__(self, light: ReferenceAreaLight):
         self.triangles = light.triangles
         double = triangle_normals(light.triangles)
         self.areas = 0.5 * np.linalg.norm(double, axis=1)

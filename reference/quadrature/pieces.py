@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.segments import AMBIENT, Segments, depth_through_media
 from reference.quadrature.unbounded import Stretches
-from reference.scene.read import TruthMedium, TruthScene, homogeneous_around
+from reference.scene.read import ReferenceMedium, ReferenceScene, homogeneous_around
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
@@ -22,12 +22,12 @@ Kinks = tuple[Index, Array]  # rays, and distances along them [m]
 _UNDERFLOW = 745.0  # optical depth after which nothing is left
 
 
-def medium_of(truth: TruthScene, number: int) -> TruthMedium:
+def medium_of(truth: ReferenceScene, number: int) -> ReferenceMedium:
     """Return the medium of this number."""
     return homogeneous_around(truth) if number == AMBIENT else truth.media[number]
 
 
-def by_medium(truth: TruthScene, name: str, numbers: Index) -> Array:
+def by_medium(truth: ReferenceScene, name: str, numbers: Index) -> Array:
     """Return a property of the media of these numbers, (n, 3)."""
     media = (*truth.media, truth.medium)  # AMBIENT is the last
     return np.stack([getattr(medium, name) for medium in media])[numbers]
@@ -38,7 +38,7 @@ class Pieces:
     """Smooth pieces of rays, each in one medium."""
 
     ray: Index  #: number of the ray, (n,)
-    medium: Index  #: number in `TruthScene.media`, or `AMBIENT`, (n,)
+    medium: Index  #: number in `ReferenceScene.media`, or `AMBIENT`, (n,)
     x0: Array  #: distance from the camera where the piece begins, (n,) [m]
     x1: Array  #: where it ends, (n,) [m]
     first: NDArray[np.bool_]  #: whether it begins where a lit interval does, (n,)
@@ -50,7 +50,7 @@ class Pieces:
         return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
-def cut_pieces(truth: TruthScene, rays: Rays, segments: Segments, lit: Stretches, kinks: Kinks) -> Pieces:
+def cut_pieces(truth: ReferenceScene, rays: Rays, segments: Segments, lit: Stretches, kinks: Kinks) -> Pieces:
     """Cut lit stretches at the bounds of media and at every kink of the integrand.
 
     `truth`, `rays`, `segments`: the scene, the rays, and the media along them; `lit`: rays, (stretches,), and distances
@@ -73,7 +73,7 @@ def whole(lit: Stretches) -> Pieces:
     return Pieces(ray, medium, x0, x1, every, np.isfinite(x1), np.zeros((len(ray), 3)), np.arange(len(ray)))
 
 
-def _parts(truth: TruthScene, rays: Rays, segments: Segments, ray: Index, x0: Array, x1: Array) -> Pieces:
+def _parts(truth: ReferenceScene, rays: Rays, segments: Segments, ray: Index, x0: Array, x1: Array) -> Pieces:
     """Return what parts of lit intervals lie in each medium, by ray and distance."""
     parts = []
     for start, end, medium in zip(segments.start, segments.end, segments.medium):

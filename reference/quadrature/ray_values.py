@@ -31,7 +31,7 @@ from reference.quadrature.replicates import Keep, PointPlan
 from reference.quadrature.sky import sky_light
 from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.certificate import RandomChecks, reached_by_shadow_rays
 from reference.visibility.exact_distance import exact_distance
@@ -43,7 +43,7 @@ _STEPS = 1000  # of progress through the points of lights with extent, and throu
 
 
 @dataclass(frozen=True)
-class TruthImage:
+class ReferenceImage:
     """Radiance of every pixel; arrays of shape (height, width[, 3])."""
 
     airlight: Array  #: in-scattered radiance [W/(m^2 sr)]
@@ -84,7 +84,7 @@ class RayValues:
 
 
 def ray_values(
-    truth: TruthScene,
+    truth: ReferenceScene,
     *,
     checks: int = 32,
     shadow_scale: float = 1.0,
@@ -111,7 +111,7 @@ def ray_values(
     how = {"checks": checks, "shapes": shapes}
     wide_parts = 2 * bool(truth.area) + (truth.sky is not None)
     total = len(truth.lights) + len(truth.directional) + _STEPS * wide_parts
-    lights: list[TruthLight | DirectionalLight] = [*truth.lights, *truth.directional]
+    lights: list[ReferenceLight | DirectionalLight] = [*truth.lights, *truth.directional]
     for number, light in enumerate(lights):
         if isinstance(light, DirectionalLight):
             received = directional_airlight(truth, light, hits.distance, **how)

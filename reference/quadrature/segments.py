@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from reference.visibility.line_crossings import crossings, half_chord
 from reference.visibility.planes import Rays
 
@@ -38,10 +38,10 @@ class Segments:
 
     start: Array  #: distance from the origin [m]
     end: Array  #: may be infinite [m]
-    medium: Index  #: number in `TruthScene.media`, or `AMBIENT`
+    medium: Index  #: number in `ReferenceScene.media`, or `AMBIENT`
 
 
-def depth_through_media(truth: TruthScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+def depth_through_media(truth: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
     """Return the optical depth of parts of rays where all media are homogeneous.
 
     `truth`: the scene; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit vectors, (n, 3); `low`,
@@ -58,7 +58,7 @@ def depth_through_media(truth: TruthScene, origin: Array, direction: Array, low:
     return np.maximum(total, 0.0)
 
 
-def camera_segments(truth: TruthScene, distance: Array) -> Segments:
+def camera_segments(truth: ReferenceScene, distance: Array) -> Segments:
     """Return the parts of the camera rays before `distance`, (pixels,) [m], that lie in media that scatter.
 
     The slots of a ray hold the bodies in the order in which it passes them, and what lies before, between and behind.

@@ -16,7 +16,7 @@ stands in the light and bounds have no edges; an edge costs digits, and no pixel
 It follows at once:
 
 - In an unbounded medium of extinction above 0 the sky is infinitely far, tau(x, w') is infinite, and nothing of it
-  arrives: the scattered light is 0, as is the sky seen through it. Such a scene has no sky (`TruthScene.sky`).
+  arrives: the scattered light is 0, as is the sky seen through it. Such a scene has no sky (`ReferenceScene.sky`).
 - In height fog the paths from directions at and below the horizon end at the floor of the fog. Without a floor they
   would be infinitely deep. Under an isotropic phase function the light scattered at a height z, with the column C above
   and B below it, is Ls (E_2(C) + E_2(B))/2, E_2 the exponential integral: it checks the sum.
@@ -33,7 +33,7 @@ from reference.quadrature.light_airlight import directional_airlight
 from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.surface import ENDLESS, Reflection, SurfaceHits
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from reference.scene.shapes import Shapes
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class SkyLight:
 
 
 def sky_light(
-    truth: TruthScene, hits: SurfaceHits, *, shapes: Shapes, plan: PointPlan, tell: Share = lambda share: None
+    truth: ReferenceScene, hits: SurfaceHits, *, shapes: Shapes, plan: PointPlan, tell: Share = lambda share: None
 ) -> SkyLight:
     """Compute what a uniform sky adds to airlight and surfaces along every ray.
 

@@ -21,7 +21,7 @@ from reference.quadrature.fields import optical_depth
 from reference.scene.area_light import is_area
 from reference.scene.device import as_rows, on_device, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -37,7 +37,7 @@ class SurfaceHits:
     interaction: Any  #: Mitsuba's surface interactions
 
 
-def surface_hits(truth: TruthScene) -> SurfaceHits:
+def surface_hits(truth: ReferenceScene) -> SurfaceHits:
     """Cast the pixel-centre rays from the pinhole."""
     ray = mi.Ray3f(mi.Point3f(*(float(c) for c in truth.origin)), dr.normalize(mi.Vector3f(truth.direction.T)))
     dr.make_opaque(ray)  # one kernel for all cameras
@@ -61,7 +61,7 @@ class Reflection:
 
 
 def lit_surface(
-    truth: TruthScene, hits: SurfaceHits, *, reached: Sequence[NDArray[np.bool_]], shadow_scale: float = 1.0
+    truth: ReferenceScene, hits: SurfaceHits, *, reached: Sequence[NDArray[np.bool_]], shadow_scale: float = 1.0
 ) -> Array:
     """Return the radiance of the surface at each pixel centre that point, spot and directional lights give it.
 
@@ -80,7 +80,7 @@ def lit_surface(
     emitters = [emitter for emitter in truth.scene.emitters() if not is_area(emitter)]
     emitters = sorted(emitters, key=is_directional)
     facing = interaction.is_valid()
-    lights: list[TruthLight | DirectionalLight] = [*truth.lights, *truth.directional]
+    lights: list[ReferenceLight | DirectionalLight] = [*truth.lights, *truth.directional]
     for emitter, light, reaches in zip(emitters, lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.panels import airlight_segments
-from reference.scene.read import TruthLight, TruthMedium
+from reference.scene.read import ReferenceLight, ReferenceMedium
 from reference.scene.varying import VaryingMedium
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.planes import Rays, cone_interval, falloff
@@ -41,7 +41,7 @@ TERMS = Terms()
 class Unbounded:
     """One homogeneous medium everywhere, or a vacuum; a field (`reference.quadrature.fields`)."""
 
-    medium: TruthMedium
+    medium: ReferenceMedium
 
     @property
     def strongest(self) -> Array:
@@ -82,12 +82,14 @@ def weight_of(profile: Profile | None, ray: Index) -> Callable[[Array, Index], A
     return None if profile is None else lambda x, row: profile(x, ray[row])
 
 
-def strongest(medium: TruthMedium | VaryingMedium) -> Array:
+def strongest(medium: ReferenceMedium | VaryingMedium) -> Array:
     """Return the most that a metre of a ray scatters in a medium, albedo sigma_t p, (3,) [1/m]."""
     return medium.albedo * medium.largest * float(medium.phase(np.linspace(-1, 1, 1001)).max())
 
 
-def _edge_worth(plane: tuple[Array, Array], ends: tuple[Array, Array], sigma_t: float, medium: TruthMedium) -> Array:
+def _edge_worth(
+    plane: tuple[Array, Array], ends: tuple[Array, Array], sigma_t: float, medium: ReferenceMedium
+) -> Array:
     """Return what a relative uncertainty of one of the distances of the ends of each interval is worth [1/m]."""
     foot, height = plane
     total = np.zeros(len(foot))
@@ -109,7 +111,7 @@ def sums_of(owner: Index, values: Array, count: int) -> Array:
     return np.stack([np.bincount(owner, column, count) for column in values.T], axis=1)
 
 
-def profile_of(light: TruthLight, rays: Rays) -> Profile | None:
+def profile_of(light: ReferenceLight, rays: Rays) -> Profile | None:
     """Return the profile of a light along rays; None for one that is isotropic in its cone."""
     if not light.is_soft:
         return None
@@ -128,7 +130,7 @@ def cosine_profile(rays: Rays, normal: Array) -> Profile:
     return cosine
 
 
-def lit_stretches(light: TruthLight, rays: Rays, lit: LitIntervals) -> Stretches:
+def lit_stretches(light: ReferenceLight, rays: Rays, lit: LitIntervals) -> Stretches:
     """Return lit intervals, cut at the cone of full intensity, where the profile of a soft spot has its kinks.
 
     `light`, `rays`, `lit`: a point or spot light, the rays in their planes with it, and their lit intervals.

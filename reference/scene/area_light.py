@@ -26,7 +26,7 @@ _SQUARE = 1e-5  # scales and angles of a float32 transform that differ by less a
 
 
 @dataclass(frozen=True)
-class TruthAreaLight:
+class ReferenceAreaLight:
     """A rectangle, disk, sphere or mesh of constant radiance."""
 
     kind: str  #: "rectangle", "disk", "sphere" or "mesh"
@@ -91,7 +91,7 @@ def is_area(emitter: Any) -> bool:
     return bool(emitter.class_name() == "AreaLight")
 
 
-def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
+def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
     """Read an area light.
 
     `emitter`: Mitsuba's; `camera`: position of the camera [m], (3,). Raises InputError by the name of the shape: for
@@ -113,13 +113,13 @@ def read_area_light(emitter: Any, camera: Array) -> TruthAreaLight:
         return _mesh(shape, radiance, opaque)
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
     frame, half = _sides(shape, kind, matrix)
-    light = TruthAreaLight(kind, matrix[:3, 3], frame, half, radiance, opaque, shape)
+    light = ReferenceAreaLight(kind, matrix[:3, 3], frame, half, radiance, opaque, shape)
     if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + _SQUARE):
         raise _refusal(shape, "holds the camera", "a camera outside of lights: move it, or make the sphere smaller")
     return light
 
 
-def _mesh(shape: Any, radiance: Array, opaque: bool) -> TruthAreaLight:
+def _mesh(shape: Any, radiance: Array, opaque: bool) -> ReferenceAreaLight:
     parameters = mi.traverse(shape)
     corners = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     faces = np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)
@@ -141,7 +141,7 @@ def _mesh(shape: Any, radiance: Array, opaque: bool) -> TruthAreaLight:
     size = radius + float(np.abs(centre).max())
     triangles = corners[faces] + _LIFT * size * normal[:, None]
     hides = opaque and not _is_convex(corners[faces][:, 0], normal, known, _CONVEX * size)
-    light = TruthAreaLight("mesh", centre, np.eye(3), np.full(2, radius), radiance, opaque, shape)
+    light = ReferenceAreaLight("mesh", centre, np.eye(3), np.full(2, radius), radiance, opaque, shape)
     return replace(light, triangles=triangles[_neighbours(triangles.mean(axis=1))], shadows_itself=hides)
 
 

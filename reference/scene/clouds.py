@@ -19,7 +19,7 @@ from reference.scene.cloud_density import CloudDensity, read_cloud_density
 from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
 from reference.scene.read import (
     CLEAR_AIR,
-    TruthMedium,
+    ReferenceMedium,
     read_medium,
     read_scattering,
     scene_from,
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Cloud(TruthMedium):
+class Cloud(ReferenceMedium):
     """A medium within a closed surface."""
 
     shape: Any  #: Mitsuba's shape that bounds it
@@ -59,7 +59,7 @@ class CloudScene:
     camera_cloud: int  #: number of the cloud that the camera is in, -1 in clear air
 
     @property
-    def around(self) -> TruthMedium:
+    def around(self) -> ReferenceMedium:
         """What surrounds the clouds: clear air."""
         return CLEAR_AIR
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
-from reference.scene.area_light import TruthAreaLight, is_area, read_area_light
+from reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
 from reference.scene.density_grid import GridMedium, is_grid, read_grid
@@ -37,7 +37,7 @@ _AROUND = ("ConstantBackgroundEmitter", "EnvironmentMapEmitter")
 
 
 @dataclass(frozen=True)
-class TruthLight:
+class ReferenceLight:
     """A point or spot light, or a point of a light with extent."""
 
     position: Array  #: [m]
@@ -54,7 +54,7 @@ class TruthLight:
 
 
 @dataclass(frozen=True)
-class TruthMedium:
+class ReferenceMedium:
     """A homogeneous medium."""
 
     sigma_t: Array  #: extinction [1/m], RGB
@@ -68,11 +68,11 @@ class TruthMedium:
         return self.sigma_t
 
 
-CLEAR_AIR = TruthMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
+CLEAR_AIR = ReferenceMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
 
 
 @dataclass(frozen=True)
-class BoundedMedium(TruthMedium):
+class BoundedMedium(ReferenceMedium):
     """A homogeneous medium within convex bounds."""
 
     bounds: Bounds  #: what it fills
@@ -80,7 +80,7 @@ class BoundedMedium(TruthMedium):
 
 
 @dataclass(frozen=True)
-class TruthScene:
+class ReferenceScene:
     """A scene as the reference sees it."""
 
     scene: Any  #: the `mi.Scene`, whole
@@ -89,11 +89,11 @@ class TruthScene:
     height: int  #: [pixels]
     origin: Array  #: the pinhole [m], (3,)
     direction: Array  #: unit directions through the pixel centres, (pixels, 3), row by row
-    medium: TruthMedium | VaryingMedium  #: around the camera, a vacuum of extinction 0 where there is none
-    lights: tuple[TruthLight, ...]  #: point and spot lights
+    medium: ReferenceMedium | VaryingMedium  #: around the camera, a vacuum of extinction 0 where there is none
+    lights: tuple[ReferenceLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
     directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds, or a cap
-    area: tuple[TruthAreaLight, ...] = ()  #: lights with extent
+    area: tuple[ReferenceAreaLight, ...] = ()  #: lights with extent
     background: Any = None  #: Mitsuba's emitter around the scene, seen behind it; not in `scene`
     #: radiance of a uniform background, RGB [W/(m^2 sr)], which lights media and surfaces; None where none arrives:
     #: through an unbounded homogeneous medium
@@ -105,7 +105,7 @@ class TruthScene:
         return bool(self.area) or self.sky is not None
 
 
-def read_truth(scene) -> TruthScene:
+def read_reference(scene) -> ReferenceScene:
     """Read a Mitsuba scene of the current RGB variant.
 
     Raises InputError for a scene whose reference cannot be computed, with the name of what is in the way.
@@ -132,14 +132,14 @@ def read_truth(scene) -> TruthScene:
     medium = grid or _read_ambient(sensor, origin, media, boundaries)
     suns = tuple(read_directional(emitter) for emitter in far)
     for emitter, sun in zip(far, suns, strict=True):
-        if isinstance(medium, TruthMedium) and np.any(medium.sigma_t > 0):
+        if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
             raise InputError(endless_medium(emitter))
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(sun_below(emitter))
     sky = _sky(background, medium)
     if not far + near + wide and sky is None:
         raise InputError(sky_too_far(background))
-    return TruthScene(
+    return ReferenceScene(
         scene=scene if background is None else _without(scene, background),
         occluders=scene_of(opaque, scene),
         width=width,
@@ -156,7 +156,7 @@ def read_truth(scene) -> TruthScene:
     )
 
 
-def homogeneous_around(truth: TruthScene) -> TruthMedium:
+def homogeneous_around(truth: ReferenceScene) -> ReferenceMedium:
     """Return the medium without bounds, where it has one extinction.
 
     Raises InputError for height fog and grids.
@@ -173,11 +173,11 @@ def _background(scene):
     return around[0] if around and (lights or around[0].class_name() == _AROUND[0]) else None
 
 
-def _sky(background, medium: TruthMedium | VaryingMedium) -> Array | None:
+def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
     """Return the radiance of a uniform sky whose light arrives in the media of a scene."""
     if background is None or background.class_name() != _AROUND[0]:
         return None
-    if isinstance(medium, TruthMedium) and np.any(medium.sigma_t > 0):
+    if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
         if not np.all(medium.sigma_t > 0):
             raise InputError("a sky shines through a medium without bounds in some channels; wanted bounds")
         return None
@@ -197,7 +197,7 @@ def _without(scene, background):
     return _rebuilt(scene, [each for each in scene.emitters() if each != background])
 
 
-def whole_scene(truth: TruthScene):
+def whole_scene(truth: ReferenceScene):
     """Return Mitsuba's scene with the sky, if it has one."""
     if truth.sky is None:
         return truth.scene
@@ -252,7 +252,7 @@ def scene_from(shapes: list[Any]):
 
 def _read_ambient(
     sensor, origin: Array, media: tuple[BoundedMedium, ...], boundaries: list[Any]
-) -> TruthMedium | VaryingMedium:
+) -> ReferenceMedium | VaryingMedium:
     """Return the medium around the camera; refuse a camera or a boundary that says otherwise."""
     own = sensor.get_medium()
     ambient = own
@@ -317,7 +317,7 @@ def _read_bounded(shape) -> BoundedMedium:
     )
 
 
-def read_medium(medium, name: str) -> TruthMedium:
+def read_medium(medium, name: str) -> ReferenceMedium:
     """Read a homogeneous medium; messages call it by `name`."""
     if is_height_fog(medium):
         raise InputError(f"{name} is height fog, which has no sides; wanted it in the sensor, and no shape around it")
@@ -329,7 +329,7 @@ def read_medium(medium, name: str) -> TruthMedium:
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)
     sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])
-    return TruthMedium(sigma_t, *read_scattering(medium), medium)
+    return ReferenceMedium(sigma_t, *read_scattering(medium), medium)
 
 
 def read_scattering(medium) -> tuple[Array, PhaseFunction]:
@@ -358,7 +358,7 @@ def _read_phase(phase) -> PhaseFunction:
     raise InputError(f"the phase function is a {name}; wanted one of isotropic, hg, rayleigh, tabphase")
 
 
-def _read_light(emitter) -> TruthLight:
+def _read_light(emitter) -> ReferenceLight:
     name = emitter.class_name()
     if name not in ("PointLight", "SpotLight"):
         word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(name, name)
@@ -379,9 +379,11 @@ def _read_light(emitter) -> TruthLight:
     _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
     intensity = _as_given(parameters, _rgb(arriving) * distance**2)
     if not spot:
-        return TruthLight(position, intensity)
+        return ReferenceLight(position, intensity)
     cutoff = np.deg2rad(float(parameters["cutoff_angle"][0]))
-    return TruthLight(position, intensity, axis, cutoff, min(np.deg2rad(float(parameters["beam_width"][0])), cutoff))
+    return ReferenceLight(
+        position, intensity, axis, cutoff, min(np.deg2rad(float(parameters["beam_width"][0])), cutoff)
+    )
 
 
 def _as_given(parameters, measured: Array) -> Array:

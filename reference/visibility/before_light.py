@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from reference.scene.area_light import TruthAreaLight
-from reference.scene.read import TruthScene, scene_of
+from reference.scene.area_light import ReferenceAreaLight
+from reference.scene.read import ReferenceScene, scene_of
 from reference.scene.shapes import Shapes, read_shapes
 
 IN_PLANE = 1e-7  #: of the largest coordinate: what is closer to the plane of a light counts as in it; float32 corners
 
 
-def before_light(truth: TruthScene, light: TruthAreaLight) -> tuple[TruthScene, Shapes]:
+def before_light(truth: ReferenceScene, light: ReferenceAreaLight) -> tuple[ReferenceScene, Shapes]:
     """Return the scene and the shapes that can shadow a light.
 
     `truth`, `light`: the scene and one of its lights with extent.

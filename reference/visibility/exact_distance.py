@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.convex_bounds import Sphere
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from reference.scene.shapes import Disks, Shapes, is_rectangle, read_shapes
 from reference.visibility.line_crossings import half_chord
 
 Array = NDArray[np.float64]
 
 
-def exact_distance(truth: TruthScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
+def exact_distance(truth: ReferenceScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
     """Return the distances to the visible surface again in float64, where that is flat or a sphere.
 
     `truth`: the scene; its rays are those that were cast; `interaction`: Mitsuba's surface interactions: which triangle

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.convex_bounds import Sphere
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.candidates import Ball, Near, near_shapes
 from reference.visibility.certificate import LitIntervals, certified
@@ -32,7 +32,7 @@ class Obstacles:
     light: Ball  #: what holds the light
 
 
-def obstacles(truth: TruthScene, light: Ball, distance: Array, shapes: Shapes | None = None) -> Obstacles:
+def obstacles(truth: ReferenceScene, light: Ball, distance: Array, shapes: Shapes | None = None) -> Obstacles:
     """Return what can stand between a light and the rays of a scene.
 
     `truth`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,), may be infinite [m];

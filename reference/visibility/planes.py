@@ -31,7 +31,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.read import TruthLight
+from reference.scene.read import ReferenceLight
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -94,7 +94,7 @@ def rays_at(origin: Array, direction: Array, position: Array, w: int = 1) -> Ray
     return Rays(origin, direction, position, normal, foot, height if w else np.maximum(height, least), w)
 
 
-def cone_interval(rays: Rays, light: TruthLight, angle: float) -> tuple[Array, Array]:
+def cone_interval(rays: Rays, light: ReferenceLight, angle: float) -> tuple[Array, Array]:
     """Return the interval of theta inside a cone about the light's axis.
 
     `rays`, `light`: the rays in their planes with the light; for a point light the interval is that of the whole line;
@@ -112,7 +112,7 @@ def cone_interval(rays: Rays, light: TruthLight, angle: float) -> tuple[Array, A
     return middle - half, middle + half
 
 
-def falloff(theta: Array, rays: Rays, light: TruthLight) -> Array:
+def falloff(theta: Array, rays: Rays, light: ReferenceLight) -> Array:
     """Return intensity over that on the axis [1]: Mitsuba's spot profile, linear behind the beam, or a cosine.
 
     `theta`: angles at the light, (rays, angles) [rad]; `rays`, `light`: the rays in their planes with the light.

@@ -129,10 +129,10 @@ def describe(
 def _write_grid(path: Path, scene: Any) -> str:
     from reference.scene.density_grid import GridMedium
     from reference.scene.height_fog import HeightMedium
-    from reference.scene.read import read_truth
+    from reference.scene.read import read_reference
     from reports.interchange.fog_grid import write_fog_grid
 
-    medium = read_truth(scene).medium
+    medium = read_reference(scene).medium
     if not isinstance(medium, HeightMedium | GridMedium):
         raise InputError(
             f"output: got {path}, and the medium is no height fog and no grid; wanted a name that ends in .glb"

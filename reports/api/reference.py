@@ -168,12 +168,12 @@ def reference(
 
 
 def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool) -> None:
-    from validation.study.cost import check_work, sampled_work, truth_work
+    from validation.study.cost import check_work, reference_work, sampled_work
 
     size = loaded.size if loaded.scene.sensors() else (1, 1)
     if budget is None:
         area = 16 if pixel == "area" else 1  # rays in a pixel
-        work = truth_work(size, lights=len(loaded.scene.emitters()), images=area)
+        work = reference_work(size, lights=len(loaded.scene.emitters()), images=area)
     else:
         work = sampled_work(size, budget.samples or 64, clouds=clouds)
     check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {estimator}", [work])
@@ -208,16 +208,16 @@ def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], 
     import numpy as np
 
     from reports.api.results import Reference, sealed
-    from validation.estimates.images import whole_truth
-    from validation.estimates.quadrature import truth_image
+    from validation.estimates.images import whole_reference
+    from validation.estimates.quadrature import reference_image
 
-    found = truth_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
+    found = reference_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
     finite = np.isfinite(found.airlight)
     mean = float(found.airlight[finite].mean()) if finite.any() else 0.0
     counts = ("transitions", "checked", "disagreements", "refined", "left")
     return Reference(
         scene=loaded.name,
-        image=sealed(whole_truth(loaded, found, pixel=pixel)),
+        image=sealed(whole_reference(loaded, found, pixel=pixel)),
         estimator="quadrature",
         relative_error=float(found.airlight_bound[finite].mean()) / mean if mean > 0 else float("nan"),
         details={"pixel": pixel} | {name: getattr(found, name) for name in counts},

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.kept import Spent, fresh_results, fresh_since, stopwatch
 from reports.cluster.connect import Client, facts
 from reports.cluster.run import Group, Task, run_groups
 from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
-from validation.estimates.quadrature import has_truth, keep_truth, truth_image
+from validation.estimates.quadrature import has_reference, keep_reference, reference_image
 from validation.scenes.loading import load_scene
 
 _LIMIT = 6 * 3600.0  # of a reference or a batch [s]
@@ -48,12 +48,12 @@ class Picture:
 
 def bring_references(cluster: Client, pictures: Sequence[Picture], *, pixel: str = "centre") -> None:
     """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here."""
-    lacking = [picture for picture in pictures if not has_truth(picture.load(), pixel=pixel)]
+    lacking = [picture for picture in pictures if not has_reference(picture.load(), pixel=pixel)]
     named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
     given = pixel, fresh_since()
     groups = [Group((Task(name, _reference, (picture, *given), _LIMIT),)) for name, picture in named.items()]
     for name, value in _done(cluster, groups):
-        keep_truth(named[name].load(), *value, pixel=pixel)
+        keep_reference(named[name].load(), *value, pixel=pixel)
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
@@ -96,10 +96,10 @@ def spread(cluster: Client, picture: Picture) -> ElsewhereFor:
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 
 
-def _reference(picture: Picture, pixel: str, since: float | None) -> tuple[TruthImage, Spent]:
+def _reference(picture: Picture, pixel: str, since: float | None) -> tuple[ReferenceImage, Spent]:
     scene, spent = picture.load(), stopwatch()
     with fresh_results(since):
-        return truth_image(scene, pixel=pixel), spent()
+        return reference_image(scene, pixel=pixel), spent()
 
 
 def _batch(kind: bytes, seed: int) -> tuple[Batches, Spent]:

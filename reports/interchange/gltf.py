@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.files import write_bytes
 from reports import __version__
 from reports.interchange.meshes import ShapeMesh, shape_mesh
@@ -61,7 +61,7 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     Returns `path`, `triangles`, `bytes` and `tessellated`, the names of the shapes that are not triangles by nature.
     """
     described = describe_scene(loaded)
-    scene = read_truth(loaded.scene)
+    scene = read_reference(loaded.scene)
     turn = np.array(_TURNS[described["up"]], dtype=np.float64)
     opaque = [shape_mesh(shape) for shape in scene.occluders.shapes() if not shape.is_emitter()]
     lamps = [shape_mesh(light.shape) for light in scene.area]

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
-from reference.scene.area_light import TruthAreaLight
+from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.camera import camera_matrix
 from reference.scene.density_grid import GridMedium
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthLight, TruthMedium, TruthScene, read_truth
+from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
 from reference.scene.varying import VaryingMedium
 from reports.interchange.cycles import cycles_properties
 from validation.scenes.engine_fog import ENGINES, parameters_of
@@ -55,7 +55,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     what is in the way.
     """
     notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
-    scene = read_truth(loaded.scene)
+    scene = read_reference(loaded.scene)
     camera = _camera(loaded.scene.sensors()[0], scene)
     described = {
         "scene": loaded.name,
@@ -115,7 +115,7 @@ def surface(shape: Any) -> dict[str, Any]:
     }
 
 
-def _camera(sensor: Any, scene: TruthScene) -> dict[str, Any]:
+def _camera(sensor: Any, scene: ReferenceScene) -> dict[str, Any]:
     import mitsuba as mi
 
     matrix = camera_matrix(sensor)
@@ -137,7 +137,7 @@ def _camera(sensor: Any, scene: TruthScene) -> dict[str, Any]:
     }
 
 
-def _medium(medium: TruthMedium | VaryingMedium) -> dict[str, Any] | None:
+def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
     """Return the numbers of a medium, None for a vacuum."""
     if medium.plugin is None:
         return None
@@ -218,7 +218,7 @@ def spot_power_angle(beam: float, cutoff: float) -> float:
     return float(2 * np.pi * (1 - np.cos(0.5 * (cutoff + beam)) * np.sinc(half / np.pi)))
 
 
-def _light(light: TruthLight) -> dict[str, Any]:
+def _light(light: ReferenceLight) -> dict[str, Any]:
     intensity = np.array(_numbers(light.intensity))
     sphere = 4 * np.pi * intensity
     described: dict[str, Any] = {
@@ -249,7 +249,7 @@ def _directional(light: DirectionalLight) -> dict[str, Any]:
     }
 
 
-def _area(light: TruthAreaLight) -> dict[str, Any]:
+def _area(light: ReferenceAreaLight) -> dict[str, Any]:
     r"""Return a light with extent: a Lambertian emitter of area A sends pi Le A, from a sphere of 4 pi r^2 too."""
     radiance = np.array(_numbers(light.radiance))
     power = np.pi * light.area * radiance

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from realtime.scene.features import describe
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import Image, write_exr
 from reports.machine.environment import stamped
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
-from validation.estimates.images import layered_truth
+from validation.estimates.images import layered_reference
 from validation.metrics.errors import plain
 from validation.scenes.loading import scene_stem
 from validation.study.scene import Judged, SceneResult
@@ -37,7 +37,7 @@ def write_scene(result: SceneResult, folder: Path) -> dict[str, Any]:
     light = reference.airlight + reference.surface
     factor = exposure(light)
     pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(reference.airlight, factor)}
-    named = files.written(_REFERENCE, layered_truth(study.name, reference), pictures)
+    named = files.written(_REFERENCE, layered_reference(study.name, reference), pictures)
     stems = file_stems([judged.row["label"] for judged in result.rows])
     size = list(study.size)
     return {
@@ -84,7 +84,7 @@ def row_entry(row: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def reference_data(reference: TruthImage) -> dict[str, Any]:
+def reference_data(reference: ReferenceImage) -> dict[str, Any]:
     """Return what the quadrature reference says of its errors, without its images."""
     finite = np.isfinite(reference.airlight)
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")

@@ -196,15 +196,15 @@ def _map_study(
     """Return of every scene its name and the errors by size."""
     from realtime.scene.read_scene import read_scene
     from reports.api.scenes import opened
-    from validation.estimates.quadrature import truth_image
+    from validation.estimates.quadrature import reference_image
     from validation.study.configuration import configuration, prepared
-    from validation.study.cost import check_work, frame_work, truth_work
+    from validation.study.cost import check_work, frame_work, reference_work
     from validation.study.reference import of_image
     from validation.study.run import run
     from validation.study.study import Cell, Measure
 
     loaded = [opened(name, pixels) for name in names]
-    works = [truth_work(pixels, lights=len(each.scene.emitters())) for each in loaded]
+    works = [reference_work(pixels, lights=len(each.scene.emitters())) for each in loaded]
     works += [frame_work(pixels, frames=len(texels)) for _ in loaded]
     check_work(f"map-size, {pixels[0]} x {pixels[1]}", works)
     by_size = [configuration(method, None, parameters | {"map": size}) for size in texels]
@@ -214,7 +214,7 @@ def _map_study(
     with telling(progress, "map-size") as tell:
         for at, each in enumerate(loaded):
             part = counted(part_of(tell, at / len(loaded), (at + 1) / len(loaded), before=f"{each.name}, "))
-            scene, reference = read_scene(each.scene), of_image(truth_image(each.scene))
+            scene, reference = read_scene(each.scene), of_image(reference_image(each.scene))
             errors = []
             for number, chosen in enumerate(by_size):
                 part(number, len(by_size), chosen.label)

@@ -135,14 +135,14 @@ def methods(
 def _check_work(what: str, loaded: list[Any], chosen: list[Any], *, progress: Any) -> None:
     from realtime.scene.read_scene import read_scene
     from validation.study.configuration import configuration_work
-    from validation.study.cost import check_work, truth_work
+    from validation.study.cost import check_work, reference_work
 
     works = []
     for each in loaded:
         scene = read_scene(each.scene)
         note(progress, scene.features.notes)
         at = scene.camera.width, scene.camera.height
-        works.append(truth_work(at, lights=len(scene.lights) + len(scene.area_lights)))
+        works.append(reference_work(at, lights=len(scene.lights) + len(scene.area_lights)))
         works += [configuration_work(scene, one) for one in chosen]
     check_work(what, works)
 
@@ -159,7 +159,7 @@ def _methods_in(
     from realtime.scene.read_scene import read_scene
     from reports.machine.own_process import in_own_process
     from reports.report.scene import row_entry
-    from validation.estimates.quadrature import truth_image
+    from validation.estimates.quadrature import reference_image
     from validation.metrics.errors import plain
     from validation.study.reference import of_image
     from validation.study.run import run
@@ -167,7 +167,7 @@ def _methods_in(
     from validation.study.study import Cell, Measure
 
     progress(0.0, f"{loaded.name}: the reference")
-    scene, reference = read_scene(loaded.scene), of_image(truth_image(loaded.scene))
+    scene, reference = read_scene(loaded.scene), of_image(reference_image(loaded.scene))
     size, path = (scene.camera.width, scene.camera.height), str(loaded.path or loaded.name)
     wanted = Measure("stages", seconds, every_metric=False)
     entries, rows = [], []
@@ -279,7 +279,7 @@ def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tup
     from realtime.errors import InputError as MethodError
     from realtime.scene.read_scene import read_scene
     from reports.machine.own_process import in_own_process
-    from validation.estimates.quadrature import truth_image
+    from validation.estimates.quadrature import reference_image
     from validation.metrics.errors import plain
     from validation.study.decompose import decompose, exact_sum
     from validation.study.run import frame_of
@@ -288,7 +288,7 @@ def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tup
 
     scene = read_scene(loaded.scene)
     progress(0.0, f"{loaded.name}: the reference")
-    reference = truth_image(loaded.scene).airlight
+    reference = reference_image(loaded.scene).airlight
     exact = cache(partial(exact_sum, scene))
     entries, split = [], []
     useful = configurations_for(scene.features, chosen)

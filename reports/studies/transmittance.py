@@ -36,12 +36,12 @@ def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> S
     from reports.machine.environment import activate
 
     activate()
-    from reference.scene.read import read_truth
+    from reference.scene.read import read_reference
     from reports.api.scenes import opened
     from validation.estimates.transmittance import transmittance_errors
 
     with telling(progress, "rays") as tell:
-        read = read_truth(opened(scene, (8, 6)).scene)
+        read = read_reference(opened(scene, (8, 6)).scene)
         rows = [asdict(each) for each in transmittance_errors(read, _STEPS, progress=tell)]
     columns = (
         *words("estimator"),

@@ -56,7 +56,7 @@ def yield_processor() -> None:
 def answers(task: Task) -> Iterator[Answer]:
     """Yield the reference of an image, rays after rays."""
     from reports.view.reference_order import pixel_order
-    from validation.estimates.quadrature import reference_error, truth_of_pixels
+    from validation.estimates.quadrature import reference_error, reference_of_pixels
     from validation.scenes.loading import load_scene
 
     scene = load_scene(task.scene, task.size, task.changes).scene
@@ -67,7 +67,7 @@ def answers(task: Task) -> Iterator[Answer]:
     while begin < len(order):
         chosen = order[begin : begin + rays]
         start = time.perf_counter()
-        found = truth_of_pixels(scene, chosen)
+        found = reference_of_pixels(scene, chosen)
         taken = time.perf_counter() - start
         begin += len(chosen)
         rays = int(np.clip(rays * np.clip(_CHUNK / max(taken, 1e-3), 0.25, 2), 16, _MOST))

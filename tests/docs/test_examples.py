@@ -140,13 +140,13 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
     """Steps in the angle without shifts are `ray-march`; twice as many come closer to the truth."""
 
     from realtime.scene.read_scene import read_scene
-    from validation.estimates.quadrature import truth_image
+    from validation.estimates.quadrature import reference_image
     from validation.study.reference import of_image
     from validation.study.run import run
     from validation.study.study import Cell, Measure
 
     loaded = mi.load_dict(tiny_scene())
-    scene, reference = read_scene(loaded), of_image(truth_image(loaded))
+    scene, reference = read_scene(loaded), of_image(reference_image(loaded))
     size = scene.camera.width, scene.camera.height
 
     def measured(method, **parameters):

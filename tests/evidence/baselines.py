@@ -24,8 +24,8 @@ import numpy as np
 from realtime.kernels.registry import KERNELS
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.ray_values import TruthImage
-from validation.estimates.quadrature import truth_image
+from reference.quadrature.ray_values import ReferenceImage
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import plain
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import SCENES
@@ -78,7 +78,7 @@ def measure_baseline(name: str) -> dict[str, Any]:
     """Measure what the baseline of a built-in scene holds, without revision and reason."""
     loaded = load_scene(name, SIZE)
     scene = read_scene(loaded.scene)
-    truth = truth_image(loaded.scene)
+    truth = reference_image(loaded.scene)
     chosen = baseline_configurations(name, scene.features)
     return {
         "scene": name,
@@ -88,7 +88,7 @@ def measure_baseline(name: str) -> dict[str, Any]:
     }
 
 
-def _entry(scene: Scene, chosen: Configuration, truth: TruthImage) -> dict[str, Any]:
+def _entry(scene: Scene, chosen: Configuration, truth: ReferenceImage) -> dict[str, Any]:
     """Return the errors of one configuration, or why it was refused."""
     row, frame = run(Cell("", SIZE, (), chosen, Measure("none", every_metric=False)), scene, of_image(truth))
     if row.error is None or frame is None:

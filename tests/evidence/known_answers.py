@@ -16,7 +16,7 @@ from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import ReferenceScene, read_reference
 from tests.evidence.certified.model import FogBox, FogScene, FogScreen, fog_scenes, load_fog, mitsuba_dict
 
 Scene = dict[str, Any]
@@ -169,11 +169,11 @@ def white(scene: Scene) -> Scene:
     return {name: entry | {"bsdf": half} if name.startswith("occluder") else entry for name, entry in scene.items()}
 
 
-def truth_of(scene: Scene | FogScene) -> TruthScene:
-    return read_truth(load_fog(mitsuba_dict(scene) if isinstance(scene, FogScene) else scene))
+def reference_of(scene: Scene | FogScene) -> ReferenceScene:
+    return read_reference(load_fog(mitsuba_dict(scene) if isinstance(scene, FogScene) else scene))
 
 
-def layers(truth: TruthScene, estimator: str = "quadrature") -> np.ndarray:
+def layers(truth: ReferenceScene, estimator: str = "quadrature") -> np.ndarray:
     """Return airlight and surface by an estimator, (2, pixels, 3) [W/(m^2 sr)]."""
     if estimator == "quadrature":
         image = quadrature_image(truth, plan=PLAN)
@@ -183,7 +183,7 @@ def layers(truth: TruthScene, estimator: str = "quadrature") -> np.ndarray:
 
 
 def airlight(scene: Scene, estimator: str = "quadrature") -> np.ndarray:
-    return layers(truth_of(scene), estimator)[0]
+    return layers(reference_of(scene), estimator)[0]
 
 
 def difference(computed: np.ndarray, expected: np.ndarray) -> float:

@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 
 from reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from tests.evidence.injected import Change, Put, Rewrite, Wrap
 
 _BOUNDED = "reference.quadrature.bounded"
@@ -93,8 +93,8 @@ def _phase(name: str, change: Callable[..., Any]) -> Wrap:
 _BACKWARD = Wrap("analytic.phase:PhaseFunction.from_half", lambda function, self, down, up: function(self, up, down))
 
 
-def _read(change: Callable[[TruthScene], TruthScene]) -> Wrap:
-    return Wrap("reference.scene.read:read_truth", lambda function, scene: change(function(scene)))
+def _read(change: Callable[[ReferenceScene], ReferenceScene]) -> Wrap:
+    return Wrap("reference.scene.read:read_reference", lambda function, scene: change(function(scene)))
 
 
 def _spots(change: Callable[..., Any]) -> Wrap:

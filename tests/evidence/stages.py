@@ -21,14 +21,14 @@ from reference.monte_carlo.batches import LAYERS, Batches, merged
 from reference.monte_carlo.single_scatter import integrator as single_scatter
 from reference.monte_carlo.volpath import integrator as volpath
 from reference.quadrature import image as quadrature
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import PointPlan
 from reference.scene import read
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.evidence.injected import injected
 from tests.evidence.mutations import Mutation
 from tests.helpers.probes import PROBES, WIDE_PROBES
-from validation.estimates.agreement import batch_estimate, layer_masks, truth_estimate, width_to_reach
+from validation.estimates.agreement import batch_estimate, layer_masks, reference_estimate, width_to_reach
 from validation.scenes.loading import load_scene, resize
 from validation.statistics.comparison import compare_statistics
 
@@ -53,7 +53,7 @@ class Stage:
     """A scene with the images of unchanged estimators."""
 
     scene: Any  # the `mi.Scene`
-    image: TruthImage
+    image: ReferenceImage
     masks: dict[str, NDArray[np.bool_]]  # pixels to compare, by layer
     margins: dict[str, float]  # by layer
     batches: Batches  # of single-scatter
@@ -88,7 +88,7 @@ def stage_scene(name: str) -> Any:
 def stage_of(name: str) -> Stage:
     """Return a stage; single-scatter runs until its intervals are narrow enough, whatever they say."""
     scene, margins = stage_scene(name), dict(zip(LAYERS, MARGINS[name]))
-    truth = read.read_truth(scene)
+    truth = read.read_reference(scene)
     image = quadrature.quadrature_image(truth, plan=PLAN)
     masks = {layer: mask for layer, mask in layer_masks(truth, image).items() if np.any(getattr(image, layer) > 0)}
     batches = _batches(truth, range(_LEAST))
@@ -105,9 +105,9 @@ def _batches(truth, seeds: range) -> Batches:
     return reduce(merged, (single_scatter.single_scatter_batch(truth, seed, _DISTANCES) for seed in seeds))
 
 
-def _statistics(image: TruthImage, batches: Batches, layer: str, mask: Any, margin: float):
+def _statistics(image: ReferenceImage, batches: Batches, layer: str, mask: Any, margin: float):
     test = batch_estimate(batches, layer, mask)
-    return compare_statistics(truth_estimate(image, layer, test, mask), test, mask=mask, margin=margin)
+    return compare_statistics(reference_estimate(image, layer, test, mask), test, mask=mask, margin=margin)
 
 
 def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Sighting]:
@@ -115,7 +115,7 @@ def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Si
     # A fault may divide by zero or overflow: its image shows that.
     with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        truth = read.read_truth(stage.scene)
+        truth = read.read_reference(stage.scene)
         image, batches = stage.image, stage.batches
         if estimator == "quadrature":
             image = quadrature.quadrature_image(truth, plan=PLAN)
@@ -126,7 +126,7 @@ def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Si
         yield _sighting(image, batches, layer, mask, stage.margins[layer], against)
 
 
-def _sighting(image: TruthImage, batches: Batches, layer: str, mask: Any, margin: float, against: str) -> Sighting:
+def _sighting(image: ReferenceImage, batches: Batches, layer: str, mask: Any, margin: float, against: str) -> Sighting:
     finite = np.isfinite(getattr(image, layer)[mask]).all() and np.isfinite(batches.mean[LAYERS.index(layer)]).all()
     if not finite:
         return Sighting(layer, against, float("nan"), (-np.inf, np.inf), agrees=False)
@@ -137,8 +137,8 @@ def _sighting(image: TruthImage, batches: Batches, layer: str, mask: Any, margin
 
 def volpath_seen(mutation: Mutation | None, stage: Stage, batches: int) -> list[Sighting]:
     """Compare a quadrature that may be changed with volpath, over its shortened shadow rays."""
-    truth = read.read_truth(stage.scene)
+    truth = read.read_reference(stage.scene)
     traced = reduce(merged, (volpath.volpath_batch(truth, seed, _SAMPLES) for seed in range(batches)))
     with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"):
-        image = quadrature.quadrature_image(read.read_truth(stage.scene), shadow_scale=1 - measure_shadow_epsilon())
+        image = quadrature.quadrature_image(read.read_reference(stage.scene), shadow_scale=1 - measure_shadow_epsilon())
     return [_sighting(image, traced, layer, mask, VOLPATH_MARGIN, "volpath") for layer, mask in stage.masks.items()]

@@ -15,7 +15,7 @@ import pytest
 from analytic.phase import PhaseFunction
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.unbounded import Terms, Unbounded, lit_stretches, profile_of
-from reference.scene.read import TruthLight, TruthMedium, read_truth
+from reference.scene.read import ReferenceLight, ReferenceMedium, read_reference
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights
@@ -58,9 +58,9 @@ def bound(scene):
     return np.array([pixel["bound"] for pixel in scene["pixels"]], dtype=float)
 
 
-def truth_of(scene):
+def reference_of(scene):
     """Read the file's Mitsuba scene; its lights must be those of the file, bit by bit."""
-    truth = read_truth(load_fog(scene["mitsuba"]))
+    truth = read_reference(load_fog(scene["mitsuba"]))
     for light, given in zip(truth.lights, scene["lights"], strict=True):
         assert np.array_equal(light.intensity, np.array(given["intensity"], dtype=float))
     return truth
@@ -126,7 +126,7 @@ def test_all_rays_come_out_the_same(certified, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_quadrature_agrees_within_its_own_bound(variant, certified, name):
     """The route that shares nothing: lit intervals of triangles and spheres in a plane, Kronrod's panels in float64."""
-    image = quadrature_image(truth_of(certified[name]))
+    image = quadrature_image(reference_of(certified[name]))
     value = radiance(certified[name])
     difference = np.abs(image.airlight.reshape(-1, 3) - value)
     # The last term: both routes take the directions through the pixel centres for themselves, 3e-16 apart.
@@ -175,12 +175,12 @@ def test_all_rows_again(area_rows):
 def test_the_truth_of_one_point(area_rows, number):
     row = area_rows["points"][number]
     phase = PhaseFunction("isotropic") if row["g"] is None else PhaseFunction("hg", g=row["g"])
-    medium = TruthMedium(np.full(3, row["sigma_t"]), np.ones(3), phase, None)
+    medium = ReferenceMedium(np.full(3, row["sigma_t"]), np.ones(3), phase, None)
     # In the plane of ray and light; what the normal has across the plane does not matter.
     beside = np.sqrt(max(0.0, 1 - row["axial"] ** 2 - row["across"] ** 2))
     quarter = 0.5 * np.pi
     normal = np.array([beside, row["across"], row["axial"]])
-    light = TruthLight(np.zeros(3), np.ones(3), normal, cutoff=quarter, beam=quarter, cosine=True)
+    light = ReferenceLight(np.zeros(3), np.ones(3), normal, cutoff=quarter, beam=quarter, cosine=True)
     place, along, across = np.zeros((1, 3)), np.array([[0.0, 0, 1]]), np.array([[0.0, 1, 0]])
     origin = row["height"] * across[0] - row["foot"] * along[0]
     rays = Rays(origin, along, place, across, np.array([row["foot"]]), np.array([row["height"]]))

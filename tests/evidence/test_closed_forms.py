@@ -10,11 +10,11 @@ from analytic.panels import airlight_segments
 from realtime.scene.read_scene import read_scene
 from realtime.shadow_maps.projection import Projection
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap, sphere_fluence
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 
 
@@ -57,7 +57,7 @@ def variations():
 def twin_error(description, size):
     """Return the error of the twin of a scene against the truth."""
     scene = mi.load_dict(description)
-    return error_metrics(truth_image(scene).airlight, oracle_airlight(read_truth(scene), maps_of(scene, size)))
+    return error_metrics(reference_image(scene).airlight, oracle_airlight(read_reference(scene), maps_of(scene, size)))
 
 
 @pytest.mark.parametrize("lamp", ["point", "soft spot"])
@@ -84,7 +84,7 @@ def plane_below(depth, size):
 @pytest.mark.parametrize("surface", [np.inf, 3.7])
 def test_shadow_of_a_plane_is_exact(variant, level, surface):
     """Rays that start at 1.3 m are lit where they are above the plane, up to the visible surface."""
-    truth = read_truth(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
+    truth = read_reference(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
     light, direction = truth.lights[0], truth.direction
     airlight = oracle_airlight(
         truth, [plane_below(light.position[2] - level, 8)], distance=np.full((truth.height, truth.width), surface)

@@ -43,8 +43,8 @@ from tests.evidence.known_answers import (
     mapped,
     one_light_each,
     panel,
+    reference_of,
     sun,
-    truth_of,
     white,
 )
 from tests.helpers.area_lights import visible_share
@@ -117,7 +117,7 @@ def test_lights_add_up(variant, name):
 @pytest.mark.parametrize("name", ["lamps", "sun"])
 @pytest.mark.parametrize("estimator", ["quadrature", "single-scatter", pytest.param("volpath", marks=pytest.mark.slow)])
 def test_no_light_leaves_a_closed_box(variant, name, estimator):
-    assert np.abs(layers(truth_of(enclosed(name)), estimator)).max() == 0
+    assert np.abs(layers(reference_of(enclosed(name)), estimator)).max() == 0
 
 
 # --- Closed forms: media ---
@@ -137,7 +137,9 @@ def floor_distance(truth) -> np.ndarray:
 def test_the_limit_of_a_vacuum(variant):
     """As sigma_t goes to 0, L / (albedo sigma_t I / (4 pi)) goes to int dx / r^2 = (theta1 - theta0)/h."""
     sigma_t = 2.0**-40
-    truth = truth_of(replace(fog_scene(), lights=fog_scene().lights[:1], occluders=(floor(),), sigma_t=(sigma_t,) * 3))
+    truth = reference_of(
+        replace(fog_scene(), lights=fog_scene().lights[:1], occluders=(floor(),), sigma_t=(sigma_t,) * 3)
+    )
     (light,) = truth.lights
     foot, height = foot_and_height(truth.origin, truth.direction, light.position)
     end = floor_distance(truth)
@@ -170,7 +172,9 @@ def test_fluence_of_first_order(variant, r):
     light = FogLight((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     scene = replace(fog_scene(), lights=(light,), occluders=(), sigma_t=(sigma_t,) * 3, albedo=(albedo,) * 3)
     directions = np.stack([np.sin(psi), np.zeros_like(psi), np.cos(psi)], axis=1)
-    around = replace(truth_of(scene), origin=np.array([0.0, 0.0, -r]), direction=directions, width=len(psi), height=1)
+    around = replace(
+        reference_of(scene), origin=np.array([0.0, 0.0, -r]), direction=directions, width=len(psi), height=1
+    )
     values = ray_values(around).airlight[:, 0] / (4 * math.pi)
     flux = 2 * math.pi * float(np.sum(values * np.sin(psi) * weights * math.pi * t))
 
@@ -187,7 +191,7 @@ def test_a_floor_in_an_absorbing_medium(variant):
     """It is dimmed by exp(-sigma_t (camera to floor + floor to light)), and there is no airlight."""
     sigma_t = 0.75
     scene = replace(fog_scene(), lights=fog_scene().lights[:1], occluders=(floor(),), albedo=(0.0,) * 3)
-    clear, dim = (truth_of(white(mitsuba_dict(replace(scene, sigma_t=(each,) * 3)))) for each in (0.0, sigma_t))
+    clear, dim = (reference_of(white(mitsuba_dict(replace(scene, sigma_t=(each,) * 3)))) for each in (0.0, sigma_t))
     end = floor_distance(clear)
     hit = np.isfinite(end)
     point = clear.origin + end[hit, None] * clear.direction[hit]
@@ -211,7 +215,7 @@ def test_a_box_of_fog_under_vertical_light(variant):
     """
     scene = {name: entry for name, entry in sun().items() if name != "slab"}
     scene["sun"] = scene["sun"] | {"to_world": {"matrix": np.diag([1.0, -1, -1, 1]).tolist()}}
-    truth = truth_of(scene)
+    truth = reference_of(scene)
     (medium,), (light,) = truth.media, truth.directional
     with np.errstate(divide="ignore"):
         lower, upper = ((BOX[0] + sign * BOX[1] - truth.origin) / truth.direction for sign in (-1, 1))
@@ -231,7 +235,7 @@ def test_a_box_of_fog_under_vertical_light(variant):
 @pytest.fixture(scope="module")
 def lit(variant):
     """The rectangle of `panel` without occluders, and eight rays."""
-    truth = truth_of(panel())
+    truth = reference_of(panel())
     return replace(truth, occluders=load_fog({"type": "scene"}), direction=truth.direction[4::8], width=8, height=1)
 
 
@@ -278,7 +282,7 @@ def test_what_a_polygon_leaves_of_a_light(variant, kind, corners):
 
     Of a disk a half plane leaves 1 - (acos u - u sqrt(1 - u^2))/pi, of a rectangle a triangle what clipping leaves.
     """
-    truth = truth_of(panel(kind))
+    truth = reference_of(panel(kind))
     half = np.array([0.625, 0.375]) if kind == "rectangle" else np.full(2, 0.5)
     middle = np.array([0.125, 0.25])
     light = replace(truth.area[0], centre=np.array([*middle, 4.0]), half=half, frame=np.diag([1.0, 1.0, -1.0]))

@@ -86,7 +86,7 @@ def test_a_fault_leaves_nothing_behind(stage_of):
     for mutation in (mutation for mutation in MUTATIONS if mutation.stage == "many-lights"):
         with injected(mutation.change):
             pass
-    image = quadrature.quadrature_image(read.read_truth(stage.scene), plan=stages.PLAN)
+    image = quadrature.quadrature_image(read.read_reference(stage.scene), plan=stages.PLAN)
     assert np.array_equal(image.airlight, stage.image.airlight)
     assert np.array_equal(image.surface, stage.image.surface)
 
@@ -125,7 +125,7 @@ def certified(variant):
 
 def furthest(certified):
     """Return the largest difference between the quadrature and the certified radiance, over the largest of these."""
-    images = [quadrature.quadrature_image(read.read_truth(scene)).airlight.reshape(-1, 3) for scene, _ in certified]
+    images = [quadrature.quadrature_image(read.read_reference(scene)).airlight.reshape(-1, 3) for scene, _ in certified]
     return max(np.abs(image - known).max() / known.max() for image, (_, known) in zip(images, certified))
 
 

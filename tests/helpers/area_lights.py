@@ -11,7 +11,7 @@ from reference.quadrature.area_lights import AreaAirlight, area_airlight, beams_
 from reference.quadrature.light_samples import sections_for_points
 from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import ReferenceScene, read_reference
 from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.lit_intervals import obstacles
@@ -85,7 +85,7 @@ def ball(**changes: Any) -> dict[str, Any]:
     return lamp("sphere", center=[0.3, 0.4, 2.9], radius=0.4, **changes)
 
 
-def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> TruthScene:
+def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> ReferenceScene:
     """Return a floor with a leaning block and a ball under a light, seen from the side, or the light alone."""
     usual = {
         "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(5.1), "bsdf": GREY},
@@ -95,10 +95,10 @@ def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> 
     shapes = ({} if empty else usual) | shapes
     camera = mi.ScalarTransform4f().look_at([0.2, -4.1, 1.9], [0.1, 0.0, 0.7], [0, 0, 1])
     chosen = {name: shape for name, shape in shapes.items() if shape is not None}
-    return read_truth(lit_scene(size=size, to_world=camera, medium=medium, lamp=light, **chosen))
+    return read_reference(lit_scene(size=size, to_world=camera, medium=medium, lamp=light, **chosen))
 
 
-def visible_share(truth: TruthScene, place, normal, samples: int):
+def visible_share(truth: ReferenceScene, place, normal, samples: int):
     """Return the share of the area of the first light, a flat one, that surface points see, (points, replicates) [1].
 
     A camera looks down on each point along its normal.
@@ -126,12 +126,12 @@ def fixed(points: int, seed: int = 0) -> PointPlan:
     return PointPlan(error=0.0, first=points, most=points, seed=seed)
 
 
-def area_airlight_of(truth: TruthScene, plan: PointPlan, distance=None) -> AreaAirlight:
+def area_airlight_of(truth: ReferenceScene, plan: PointPlan, distance=None) -> AreaAirlight:
     """Return the airlight of the area lights of a scene along its rays up to their surfaces, or to a distance [m]."""
     distance = surface_hits(truth).distance if distance is None else distance
     return area_airlight(truth, beams_of(truth, distance), np.zeros((len(distance), 3)), plan=plan)
 
 
-def airlight_replicates(truth: TruthScene, plan: PointPlan, distance=None):
+def airlight_replicates(truth: ReferenceScene, plan: PointPlan, distance=None):
     """Return the same as replicates alone, (rays, 3, replicates) [W/(m^2 sr)]."""
     return area_airlight_of(truth, plan, distance).replicates

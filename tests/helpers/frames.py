@@ -15,7 +15,7 @@ from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import Scene, read_scene
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from validation.study.configuration import find_kernel
 
 _FRAMES: dict[Any, Any] = {}
@@ -45,7 +45,7 @@ def frame(scene: dict[str, Any], method: str = "unshadowed", **options: Any):
 
 def truth(scene: dict[str, Any]):
     """Return the image of the quadrature reference, which shares no code with the methods."""
-    return _once(("truth", scene), lambda: quadrature_image(read_truth(mi.load_dict(scene))))
+    return _once(("truth", scene), lambda: quadrature_image(read_reference(mi.load_dict(scene))))
 
 
 def relative_rmse(values: Any, expected: Any) -> float:

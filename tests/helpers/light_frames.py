@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.shadow_maps.shadow_map import cast_shadow_map
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.evidence.oracles.light_volume import oracle_airlight, traced_walls
 from tests.helpers.frames import read, render
 from tests.helpers.scenes import spot, tiny_scene
@@ -87,4 +87,4 @@ def twin_of(loaded, frame, size, precision="single", *, walls="slanted"):
     scene = read(loaded, precision)
     maps = [cast_shadow_map(scene.geometry, light, size) for light in scene.lights]
     numbers = traced_walls(scene, maps) if walls == "upright" else None
-    return oracle_airlight(read_truth(loaded), maps, distance=frame.distance, walls=numbers)
+    return oracle_airlight(read_reference(loaded), maps, distance=frame.distance, walls=numbers)

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from analytic.phase import PhaseFunction
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import PointPlan
 from reference.scene.area_light import is_area
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.directional_light import is_directional
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 from validation.engine.curves import agx, blender_filmic, filmic, to_srgb
 from validation.engine.prediction import Scenery
 from validation.estimates.quadrature import reference_layer
@@ -34,7 +34,7 @@ _HOLDS = "total"
 _FOOT = 0.3048  # [m]
 _LOBE = PhaseFunction("hg", g=0.43)
 
-Make = Callable[[TruthScene], Array | None]
+Make = Callable[[ReferenceScene], Array | None]
 
 
 @dataclass(frozen=True)
@@ -46,34 +46,34 @@ class Planted:
     make: Make | None = None  #: the image of a scene with the fault; None: the scene is right
     values: Callable[[Array], Array | None] | None = None  #: what is done to the image then
 
-    def image(self, truth: TruthScene) -> Array | None:
+    def image(self, truth: ReferenceScene) -> Array | None:
         """Return the image, (height, width, 3), or None where the scene cannot have the fault."""
         image = right_image(truth) if self.make is None else self.make(truth)
         return image if image is None or self.values is None else self.values(image)
 
 
-def _quadrature(truth: TruthScene, **how: Any) -> TruthImage:
+def _quadrature(truth: ReferenceScene, **how: Any) -> ReferenceImage:
     return quadrature_image(truth, checks=_CHECKS, plan=PointPlan(most=_POINTS), **how)
 
 
-def _total(image: TruthImage) -> Array:
+def _total(image: ReferenceImage) -> Array:
     return reference_layer(image, _HOLDS, emitted=False)  # pixels that show a light take no part
 
 
-def right_image(truth: TruthScene) -> Array:
+def right_image(truth: ReferenceScene) -> Array:
     """Return the image of a scene without a fault, (height, width, 3)."""
     return _total(_quadrature(truth))
 
 
-def _of_scene(change: Callable[[TruthScene], TruthScene | None]) -> Callable[[TruthScene], Array | None]:
-    def image(truth: TruthScene) -> Array | None:
+def _of_scene(change: Callable[[ReferenceScene], ReferenceScene | None]) -> Callable[[ReferenceScene], Array | None]:
+    def image(truth: ReferenceScene) -> Array | None:
         changed = change(truth)
         return None if changed is None else _total(_quadrature(_with_emitters(changed)))
 
     return image
 
 
-def _with_emitters(truth: TruthScene) -> TruthScene:
+def _with_emitters(truth: ReferenceScene) -> ReferenceScene:
     """Return a scene whose point and spot lights are Mitsuba's too: the light on surfaces is theirs."""
     whole = truth.scene
     near = iter(truth.lights)
@@ -86,7 +86,7 @@ def _with_emitters(truth: TruthScene) -> TruthScene:
     return replace(truth, scene=mi.load_dict({"type": "scene"} | {f"part{n}": part for n, part in enumerate(parts)}))
 
 
-def _emitter(light: TruthLight) -> dict[str, Any]:
+def _emitter(light: ReferenceLight) -> dict[str, Any]:
     intensity = {"type": "rgb", "value": [float(value) for value in light.intensity]}
     if light.axis is None:
         return {"type": "point", "position": [float(value) for value in light.position], "intensity": intensity}
@@ -98,11 +98,11 @@ def _emitter(light: TruthLight) -> dict[str, Any]:
     return {"type": "spot", "to_world": mi.ScalarTransform4f(matrix), "intensity": intensity, **angles}
 
 
-def _media(truth: TruthScene, change: Callable[[Any], Any]) -> TruthScene:
+def _media(truth: ReferenceScene, change: Callable[[Any], Any]) -> ReferenceScene:
     return replace(truth, medium=change(truth.medium), media=tuple(change(medium) for medium in truth.media))
 
 
-def _optics(change: Callable[[Array, Array], tuple[Array, Array]]) -> Callable[[TruthScene], TruthScene]:
+def _optics(change: Callable[[Array, Array], tuple[Array, Array]]) -> Callable[[ReferenceScene], ReferenceScene]:
     def changed(medium: Any) -> Any:
         sigma_t, albedo = change(medium.sigma_t, medium.albedo)
         return replace(medium, sigma_t=sigma_t, albedo=albedo)
@@ -119,15 +119,17 @@ def _absorption(factor: float) -> Callable[[Array, Array], tuple[Array, Array]]:
     return change
 
 
-def _scenery(wanted: Callable[[TruthScene], bool], **given: Any) -> Callable[[TruthScene], TruthScene | None]:
+def _scenery(
+    wanted: Callable[[ReferenceScene], bool], **given: Any
+) -> Callable[[ReferenceScene], ReferenceScene | None]:
     return lambda truth: replace(truth, lights=Scenery(**given).lights(truth)) if wanted(truth) else None
 
 
-def _spots(truth: TruthScene) -> bool:
+def _spots(truth: ReferenceScene) -> bool:
     return any(light.axis is not None for light in truth.lights)
 
 
-def _pixels(truth: TruthScene, change: Callable[[Array, tuple[int, int]], Array]) -> TruthScene:
+def _pixels(truth: ReferenceScene, change: Callable[[Array, tuple[int, int]], Array]) -> ReferenceScene:
     """Return a scene whose rays go through other places on the film."""
     size = truth.width, truth.height
     sensor = truth.scene.sensors()[0]
@@ -139,7 +141,7 @@ def _other_axis(positions: Array, size: tuple[int, int]) -> Array:
     return middle + (size[0] / size[1]) * (positions - middle)
 
 
-def _darker_corners(truth: TruthScene) -> Array:
+def _darker_corners(truth: ReferenceScene) -> Array:
     """Return an image as a lens shows it: dimmed by the fourth power of the cosine, here 1/sqrt(1 + tan^2)."""
     width, height = truth.width, truth.height
     half = np.tan(0.5 * np.deg2rad(float(mi.traverse(truth.scene.sensors()[0])["x_fov"][0])))
@@ -148,11 +150,11 @@ def _darker_corners(truth: TruthScene) -> Array:
     return right_image(truth) / (1 + across**2 + along**2)[..., None] ** 2
 
 
-def _near_lights(truth: TruthScene) -> bool:
+def _near_lights(truth: ReferenceScene) -> bool:
     return bool(truth.lights)
 
 
-def _in_feet(truth: TruthScene) -> TruthScene | None:
+def _in_feet(truth: ReferenceScene) -> ReferenceScene | None:
     """Return a scene whose lengths are 1/0.3048 times as long, brought back to size: lamps and media are not.
 
     Without lamps that is another extinction, and nothing else.

@@ -12,7 +12,7 @@ from reference.monte_carlo.single_scatter.directional_sampling import sample_str
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.suns import ball_over_floor, brick, pearl, sun, sunny
 from tests.helpers.volpath import assert_volpath_agrees
@@ -22,7 +22,7 @@ HG = {"phase": {"type": "hg", "g": 0.6}}
 
 def traced(scene, batches, samples=64):
     """Return quadrature image and batches of single-scatter."""
-    truth = read_truth(mi.load_dict(scene))
+    truth = read_reference(mi.load_dict(scene))
     done = single_scatter_batch(truth, 0, samples)
     for seed in range(1, batches):
         done = merged(done, single_scatter_batch(truth, seed, samples))
@@ -101,7 +101,7 @@ def test_volpath_agrees(variant, name):
     Its shadow rays end at twice the radius of the scene's bounding sphere, less the epsilon: beyond all media.
     """
 
-    assert_volpath_agrees(read_truth(mi.load_dict(CASES[name]())), batches=16, least_precision=0.03)
+    assert_volpath_agrees(read_reference(mi.load_dict(CASES[name]())), batches=16, least_precision=0.03)
 
 
 @pytest.mark.claim("directional-wants-bounds")
@@ -111,7 +111,9 @@ def test_medium_without_bounds_is_refused(variant, estimator, bounded):
     body = {"brick": brick() | {"exterior": {"type": "ref", "id": "fog"}}} if bounded else {}
     scene = mi.load_dict(tiny_scene(lamp=None, sun=sun(), **body))
     medium = scene.sensors()[0].get_medium()
-    read = {"quadrature": lambda: read_truth(scene), "single-scatter": lambda: read_task(scene, medium, 4)}[estimator]
+    read = {"quadrature": lambda: read_reference(scene), "single-scatter": lambda: read_task(scene, medium, 4)}[
+        estimator
+    ]
     with pytest.raises(InputError, match=r"light 'sun' is directional: .* give the medium bounds") as refusal:
         read()
     assert "\n" not in str(refusal.value)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, laplace, maximum_filter, minimum_filter
 
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from validation.engine.prediction import Predictor
 from validation.engine.search import Explanation
 from validation.metrics.errors import plain
@@ -144,7 +144,7 @@ def _lies(size: Array, here: Bools) -> bool:
     return inside > _MORE * outside and (share > _SHARE or (inside > 4 * outside and share > 0.05))
 
 
-def _angles(truth: TruthScene) -> list[tuple[str, Array]]:
+def _angles(truth: ReferenceScene) -> list[tuple[str, Array]]:
     """Return the angle of every pixel to each light before the camera, (pixels,) [rad], and what it is called."""
     places = [light.position for light in truth.lights] + [light.centre for light in truth.area]
     found = []

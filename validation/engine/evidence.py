@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from validation.engine.search import Explanation, usual_size
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ _WORST = 0.02  # share of the pixels that may be as wrong as they like
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
 
 
-def no_fault(truth: TruthScene) -> float:
+def no_fault(truth: ReferenceScene) -> float:
     """Return the mean relative error that is no fault in a scene [1]."""
     return _LEFT_OF_AREA if truth.area else _LEFT
 

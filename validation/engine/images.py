@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
 from validation.clock import Timing
-from validation.engine.judge import EngineComparison, TruthOf, judge_image
+from validation.engine.judge import EngineComparison, ReferenceOf, judge_image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, judged_layer
 from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.loading import LoadedScene
@@ -100,12 +100,14 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
     return sizes[first.path]
 
 
-def measure_image(shown: EngineImage, loaded: LoadedScene, truth_of: TruthOf, *, surfaces: bool) -> ImageMeasurement:
+def measure_image(
+    shown: EngineImage, loaded: LoadedScene, reference_of: ReferenceOf, *, surfaces: bool
+) -> ImageMeasurement:
     """Judge an image from elsewhere by the reference of its scene at its size, as `airlight compare SCENE IMAGE` does.
 
     Parameters
     ----------
-    loaded, truth_of
+    loaded, reference_of
         The scene at that size, and what computes its reference for 'centre' or 'area'.
     surfaces
         Whether the scene has surfaces at all.
@@ -115,7 +117,7 @@ def measure_image(shown: EngineImage, loaded: LoadedScene, truth_of: TruthOf, *,
     layers = {layer.holds: layer.values}
     if layer.name == AIRLIGHT and SURFACE in image.layers:
         layers[SURFACE] = image.layers[SURFACE]
-    judged = judge_image(image, layer, loaded, truth_of, path=shown.path, mask=image.with_data())
+    judged = judge_image(image, layer, loaded, reference_of, path=shown.path, mask=image.with_data())
     both = surfaces and AIRLIGHT in layers and SURFACE in layers
     surface = error_metrics(judged.fit.truth.surface, layers[SURFACE]) if both else None
     return ImageMeasurement(shown, Image(layers), judged, surface, image_times(shown.path))

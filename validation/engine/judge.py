@@ -32,9 +32,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.exr import NOTE, TOTAL, Image, read_exr
 from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
 from validation.engine.error_place import ErrorPlace, error_place
@@ -42,13 +42,13 @@ from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
 from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import Progress, pixel_kinds, scene_of_size
 from validation.estimates.agreement import pixel_angle
-from validation.estimates.quadrature import reference_error, reference_layer, truth_image
+from validation.estimates.quadrature import reference_error, reference_image, reference_layer
 from validation.metrics.errors import FLOOR, plain
 from validation.scenes.loading import LoadedScene
 from validation.statistics.comparison import block_sums
 
 Array = NDArray[np.float64]
-TruthOf = Callable[[str], TruthImage]  #: returns the reference for 'centre' or 'area'
+ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
 
 BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
 RIGHT = 0.01  #: largest relative error of an image that is called right
@@ -89,9 +89,9 @@ class PixelFit:
     """The truth that an image is judged by."""
 
     pixel: str  #: 'centre' or 'area'
-    truth: TruthImage
+    truth: ReferenceImage
     hints: Hints
-    centre_error: float | None  #: where the two truths differ; None where they were not compared
+    centre_error: float | None  #: where the two references differ; None where they were not compared
     area_error: float | None
 
     @property
@@ -228,7 +228,7 @@ def compare_scene(
         image,
         judged,
         loaded,
-        truths(loaded, progress),
+        references(loaded, progress),
         path=path,
         pixel=pixel,
         mask=chosen,
@@ -241,7 +241,7 @@ def judge_image(
     image: Image,
     judged: JudgedLayer,
     loaded: LoadedScene,
-    truth_of: TruthOf,
+    reference_of: ReferenceOf,
     *,
     path: str | os.PathLike[str] = "the image",
     pixel: str | None = None,
@@ -255,7 +255,7 @@ def judge_image(
     ----------
     image, judged
         The image, and the layer of it.
-    loaded, truth_of
+    loaded, reference_of
         The scene at its size, and what computes its reference for 'centre' or 'area'.
     mask
         Which pixels are compared, (height, width); all by default.
@@ -267,9 +267,9 @@ def judge_image(
     kinds = pixel_kinds(image, pixel)
     if mask is not None and np.shape(mask) == judged.values.shape[:2]:
         judged = replace(judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan))
-    fit = fit_pixel(judged, truth_of, kinds)
+    fit = fit_pixel(judged, reference_of, kinds)
     # Light of another kind says nothing of the pixels: either reference may fit it.
-    other = _other_light(judged, [truth_of(each) for each in (kinds[0], fit.pixel)])
+    other = _other_light(judged, [reference_of(each) for each in (kinds[0], fit.pixel)])
     fit = replace(fit, hints=replace(fit.hints, words=(*fit.hints.words, *other)))
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
     layers = {name: image.layers[name]} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
@@ -305,13 +305,13 @@ def judge_image(
     )
 
 
-def truths(loaded: LoadedScene, progress: Progress | None = None) -> Callable[[str], TruthImage]:
+def references(loaded: LoadedScene, progress: Progress | None = None) -> Callable[[str], ReferenceImage]:
     """Return a function that computes the truth at pixel centres or over their areas, or takes it from the cache."""
     tell = None if progress is None else lambda done, total, what: progress(done / total, what)
-    return cache(lambda pixel: truth_image(loaded.scene, pixel=pixel, progress=tell))
+    return cache(lambda pixel: reference_image(loaded.scene, pixel=pixel, progress=tell))
 
 
-def relative_bound(truth: TruthImage) -> float:
+def relative_bound(truth: ReferenceImage) -> float:
     """Return how well the airlight is known relative to its mean, where both are finite: its bound + standard error."""
     error = truth.airlight_bound if truth.airlight_se is None else truth.airlight_bound + truth.airlight_se
     finite = np.isfinite(truth.airlight) & np.isfinite(error)
@@ -319,13 +319,13 @@ def relative_bound(truth: TruthImage) -> float:
     return float(error[finite].mean()) / mean if mean > 0 else 0.0
 
 
-def lamp_distance(loaded: LoadedScene, truth: TruthImage) -> NDArray[np.float64]:
+def lamp_distance(loaded: LoadedScene, truth: ReferenceImage) -> NDArray[np.float64]:
     """Return how far the nearest lamp is from each pixel, (height, width) [pixels in the middle of the image]."""
-    angle = pixel_angle(read_truth(loaded.scene))  # zero in an image of one column
+    angle = pixel_angle(read_reference(loaded.scene))  # zero in an image of one column
     return truth.light_angle / angle if angle > 0 else np.full(truth.light_angle.shape, math.inf)
 
 
-def _other_light(judged: JudgedLayer, fitting: list[TruthImage]) -> tuple[str, ...]:
+def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[str, ...]:
     """Say so where an image is the airlight or the surface alone, or all light, and not what it was taken for."""
     errors, powers = {}, {}
     if judged.holds == TOTAL and judged.emitted and fitting[0].emitted is not None:
@@ -354,25 +354,25 @@ def _mean_square(values: NDArray[np.floating]) -> float:
     return float(np.mean(finite**2)) if finite.size else math.inf
 
 
-def fit_pixel(image: JudgedLayer, truth_of: TruthOf, kinds: Sequence[str]) -> PixelFit:
+def fit_pixel(image: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]) -> PixelFit:
     """Return the truth that fits an image.
 
     Parameters
     ----------
-    truth_of
+    reference_of
         Computes a truth; asked for the means only if the image does not fit the centres to `_EXACT`.
     kinds
         What its pixels may be, see `validation.engine.seen.pixel_kinds`.
     """
     if len(kinds) == 1:
-        truth = truth_of(kinds[0])
+        truth = reference_of(kinds[0])
         return PixelFit(kinds[0], truth, find_hints(expected_layer(truth, image), image.values), None, None)
-    at_centre = truth_of("centre")
+    at_centre = reference_of("centre")
     centre = expected_layer(at_centre, image)
     hints = find_hints(centre, image.values)
     if _fits(centre, hints.corrected):
         return PixelFit("centre", at_centre, hints, None, None)
-    over_area = truth_of("area")
+    over_area = reference_of("area")
     area = expected_layer(over_area, image)
     apart = np.abs(area - centre) > _APART * np.maximum(area, centre)  # an infinite centre counts
     area_hints = find_hints(area, image.values)

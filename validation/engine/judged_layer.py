@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image, layer, layer_names
 from validation.estimates.quadrature import reference_layer
 
@@ -56,7 +56,7 @@ def judged_layer(
     return JudgedLayer(chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted)
 
 
-def expected_layer(truth: TruthImage, judged: JudgedLayer) -> NDArray[np.float64]:
+def expected_layer(truth: ReferenceImage, judged: JudgedLayer) -> NDArray[np.float64]:
     """Return what a layer should be, (height, width, 3) [W/(m^2 sr)]."""
     return reference_layer(truth, judged.holds, emitted=judged.emitted)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from analytic.height_fog import HeightFog, Layer
 from reference.scene.camera import camera_matrix
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from validation.engine.curves import from_srgb, to_srgb
 from validation.engine.fault import (
     Array,
@@ -157,7 +157,7 @@ def _stretched(factor: Callable[..., float]) -> Change:
     return _layers(lambda layer, *p: replace(layer, scale_height=factor(layer.scale_height, *p)))
 
 
-def _up(truth: TruthScene) -> Colour:
+def _up(truth: ReferenceScene) -> Colour:
     """Return the axis of the scene that is nearest to the camera's own way up."""
     up = camera_matrix(truth.scene.sensors()[0])[:3, 1]
     axis = int(np.argmax(np.abs(up)))

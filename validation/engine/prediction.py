@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 
 from reference.monte_carlo.batches import LAYERS
 from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 from validation.engine.seen import Seen
 from validation.fog_model.radiance import Fog, FogModel, scene_fog
 from validation.fog_model.view import View
@@ -53,7 +53,7 @@ class Scenery:
         """What decides the rays."""
         return {"offset": self.offset, "zoom": self.zoom}
 
-    def lights(self, truth: TruthScene) -> tuple[TruthLight, ...]:
+    def lights(self, truth: ReferenceScene) -> tuple[ReferenceLight, ...]:
         """Return the point and spot lights of a scene as this scenery has them."""
         lights = []
         for number, light in enumerate(truth.lights):
@@ -104,7 +104,7 @@ class Guess:
 class SceneLight:
     """The light of a scene, which all images of it share: paths by scenery, radiance by fog."""
 
-    truth: TruthScene
+    truth: ReferenceScene
     most: int = 12_000_000  #: numbers that are kept, those used last: some eight bytes each
     _kept: dict[Any, tuple[Any, int]] = field(default_factory=dict)  # with their sizes; the one used last comes last
 
@@ -173,7 +173,7 @@ class Predictor:
     light: SceneLight
 
     @property
-    def truth(self) -> TruthScene:
+    def truth(self) -> ReferenceScene:
         """The scene."""
         return self.seen.truth
 

@@ -14,7 +14,7 @@ from analytic.errors import InputError
 from reference.quadrature.emission import emitted_light
 from reference.quadrature.surface import surface_hits
 from reference.scene.density_grid import GridMedium
-from reference.scene.read import TruthLight, TruthScene, read_truth
+from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from reference.storage.exr import TOTAL, Image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer
 from validation.fog_model.radiance import FogModel, scene_fog
@@ -42,7 +42,7 @@ _TRIED = 48  # pixels that say how many samples a light needs
 class Seen:
     """An image and what is known of it."""
 
-    truth: TruthScene
+    truth: ReferenceScene
     values: Array  #: (pixels, 3), all pixels of the image, row by row [W/(m^2 sr)]
     holds: str  #: 'airlight', 'surface' or 'total'
     used: Bools  #: which pixels may take part, (pixels,)
@@ -72,7 +72,7 @@ class Seen:
                 pixels = self._with_partners(pixels[::2], apart)
         return view_of(self.truth, pixels, rays_per_side=_SIDE if self.area else 0, offset=offset, zoom=zoom)
 
-    def model(self, view: View, lights: tuple[TruthLight, ...] | None = None, **how: Any) -> FogModel:
+    def model(self, view: View, lights: tuple[ReferenceLight, ...] | None = None, **how: Any) -> FogModel:
         """Return the paths of the light that the image holds; `how`: see `scattering_paths`."""
         parts = {"airlight": self.holds != SURFACE, "surface": self.holds != AIRLIGHT, "samples": self.samples}
         return FogModel(scattering_paths(view, lights, **(parts | how)))
@@ -105,7 +105,7 @@ def seen_image(
         raise InputError(
             f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
         )
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     if isinstance(truth.medium, GridMedium):
         raise InputError(
             "the medium is a density grid, whose images fits and diagnoses do not predict; wanted homogeneous media or "
@@ -162,7 +162,7 @@ def best_kind(
     return min(found, key=error)
 
 
-def needed_samples(truth: TruthScene) -> int:
+def needed_samples(truth: ReferenceScene) -> int:
     """Return how many samples stand for an area light: twice as many until the image hardly changes.
 
     A window before pillars needs 128 where a lamp above an edge needs 16: each sample has shadows of its own.

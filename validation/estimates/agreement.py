@@ -28,12 +28,12 @@ from numpy.typing import NDArray
 
 from reference.monte_carlo.allocation import allocated
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import ReferenceScene, read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
-from validation.estimates.quadrature import reference_error, reference_layer, truth_image
+from validation.estimates.quadrature import reference_error, reference_image, reference_layer
 from validation.statistics.comparison import Estimate, Statistics, compare_statistics
 
 Array = NDArray[np.float64]
@@ -88,15 +88,15 @@ def agreement(
     is by layer, without the surface where nothing lit is visible.
     """
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
-    plain = truth_image(scene)
-    shortened = truth_image(scene, shadow_scale=1 - epsilon) if epsilon else plain
-    masks = layer_masks(read_truth(scene), plain)
+    plain = reference_image(scene)
+    shortened = reference_image(scene, shadow_scale=1 - epsilon) if epsilon else plain
+    masks = layer_masks(read_reference(scene), plain)
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
 
     def compared(traced: Batches, layer: str) -> Statistics:
         mask = masks[layer]
         test = batch_estimate(traced, layer, mask)
-        return compare_statistics(truth_estimate(shortened, layer, test, mask), test, mask=mask, margin=margin)
+        return compare_statistics(reference_estimate(shortened, layer, test, mask), test, mask=mask, margin=margin)
 
     counts = None
     if estimator == "volpath" and layers:
@@ -156,7 +156,7 @@ def agreements(
     'volpath airlight'.
     """
     by_name: dict[str, Agreement] = {}
-    least = WIDE_MARGIN if read_truth(scene).area else 0.0
+    least = WIDE_MARGIN if read_reference(scene).area else 0.0
     for estimator, margin in margins.items():
         how: dict[str, Any] = {"batches": batches, "samples": (samples or {}).get(estimator, _SAMPLES)}
         how |= {"seconds": seconds, "spread": spread}
@@ -165,7 +165,7 @@ def agreements(
     return by_name
 
 
-def truth_estimate(image: TruthImage, layer: str, test: Estimate, mask: Mask) -> Estimate:
+def reference_estimate(image: ReferenceImage, layer: str, test: Estimate, mask: Mask) -> Estimate:
     """Return a layer of a quadrature image as the reference of a comparison of the pixels of a mask with some batches.
 
     Under area lights it has standard errors, of `REPLICATES` scramblings. All pixels share their points: the mean over
@@ -187,7 +187,7 @@ def _bias(expected: Array, batches: Batches, layer: str, mask: Mask) -> float:
     return float(layer_mean(batches, layer, mask)[mask].sum() / expected[mask].sum() - 1)
 
 
-def layer_masks(truth: TruthScene, image: TruthImage) -> dict[str, Mask]:
+def layer_masks(truth: ReferenceScene, image: ReferenceImage) -> dict[str, Mask]:
     """Return the pixels to compare, by layer, (height, width): of the airlight those whose ray keeps off the lights."""
     near = image.light_angle <= MASK_PIXELS * pixel_angle(truth)
     return {"airlight": ~near & np.isfinite(image.airlight).all(axis=2), "surface": np.ones_like(near)}
@@ -222,7 +222,7 @@ def width_to_reach(statistics: Statistics, margin: float) -> float:
     return 0.5 * (high - low) / (0.4 * margin)
 
 
-def pixel_angle(truth: TruthScene) -> float:
+def pixel_angle(truth: ReferenceScene) -> float:
     """Return the angle between the two pixels in the middle of the image [rad]."""
     middle = (truth.height // 2) * truth.width + truth.width // 2
     beside = middle - 1 if truth.width > 1 else middle

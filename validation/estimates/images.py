@@ -29,11 +29,11 @@ from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
 from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
 from reference.quadrature.surface import surface_hits
 from reference.scene.clouds import read_clouds
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import ReferenceScene, read_reference
 from reference.storage.exr import Image
 from reference.storage.scene_digest import scene_digest
 from validation.estimates.agreement import MASK_PIXELS, pixel_angle
@@ -78,14 +78,14 @@ class Budget:
             raise InputError(f"--error: got {self.error:g}, wanted less than 1; 0.01 is 1 %")
 
 
-def whole_truth(loaded: LoadedScene, truth: TruthImage, *, pixel: str = "centre") -> Image:
+def whole_reference(loaded: LoadedScene, truth: ReferenceImage, *, pixel: str = "centre") -> Image:
     """Return the quadrature truth of a loaded scene as layers; the header says of which bytes of the scene."""
-    image = layered_truth(loaded.name, truth)
+    image = layered_reference(loaded.name, truth)
     made = {"airlight:pixel": pixel, "airlight:scene_digest": scene_digest(loaded.scene)}
     return replace(image, attributes=dict(image.attributes) | made)
 
 
-def layered_truth(name: str, truth: TruthImage) -> Image:
+def layered_reference(name: str, truth: ReferenceImage) -> Image:
     """Return the quadrature truth of the scene of that name as layers."""
     layers = {"airlight": truth.airlight, "airlight_bound": truth.airlight_bound, "surface": truth.surface}
     extent = {"airlight_se": truth.airlight_se, "surface_se": truth.surface_se, "emitted": truth.emitted}
@@ -128,7 +128,7 @@ def monte_carlo_reference(
     """
     seen = None
     if orders is None:
-        truth = read_truth(loaded.scene)
+        truth = read_reference(loaded.scene)
         distance = surface_hits(truth).distance
         near = near_light(truth, distance)
         shape = truth.height, truth.width
@@ -270,7 +270,7 @@ def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> dict[Target, f
     return {"pooled": pooled, "worst": worst}
 
 
-def near_light(truth: TruthScene, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
+def near_light(truth: ReferenceScene, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which pixels' rays pass a light that they see within `MASK_PIXELS` pixel widths, (pixels,).
 
     `distance` is that to the visible surface, (pixels,) [m].

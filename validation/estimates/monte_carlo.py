@@ -27,7 +27,7 @@ from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.monte_carlo.volpath.orders import volpath_orders_batch
 from reference.quadrature.surface import surface_hits
 from reference.scene.clouds import read_clouds
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.cache import cache_folder, drop_arrays
 from reference.storage.files import NO_SPACE
 from reference.storage.kept import Spent, add_spent, is_damaged, is_kept, key_of, load, stopwatch, store
@@ -162,7 +162,7 @@ def batch_tracer(
 ) -> tuple[tuple[str, ...], Trace]:
     """Return the layers of a batch, and the function that traces one from its seed; see `monte_carlo_batches`."""
     if orders is None:
-        truth = read_truth(scene)
+        truth = read_reference(scene)
         check_camera(truth)
         check_rays(truth, surface_hits(truth).distance)
         if estimator == "volpath":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The truth of a scene, from the cache where it was computed before, and what the image of a renderer holds of it.
 
-Refused are truths that are infinite, of rays that meet a light, and what is not finite for any other reason.
+Refused are references that are infinite, of rays that meet a light, and what is not finite for any other reason.
 
 With q = (x - t) + r = h E, t the foot of the light and h its distance from the ray (DESIGN section 2),
 
@@ -34,11 +34,11 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import Keep
 from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import holds
-from reference.scene.read import TruthLight, TruthScene, read_truth
+from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from reference.storage.cache import drop_arrays
 from reference.storage.exr import TOTAL
 from reference.storage.kept import Kept, Spent, is_kept, kept, key_of, load, stopwatch, store
@@ -51,28 +51,28 @@ _ROUNDING = 2.0**-24
 _USUAL: dict[str, Any] = {"checks": 32, "shadow_scale": 1.0, "pixel": "centre"}
 
 
-def truth_image(
+def reference_image(
     scene, *, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", progress: Progress | None = None
-) -> TruthImage:
+) -> ReferenceImage:
     """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
     `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`.
     Radiance that is not finite is refused.
     """
     settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
-    return kept_truth(scene, settings, progress=progress)[0]
+    return kept_reference(scene, settings, progress=progress)[0]
 
 
-def kept_truth(
+def kept_reference(
     scene, settings: Mapping[str, Any] = MappingProxyType(_USUAL), *, progress: Progress | None = None
-) -> tuple[TruthImage, Kept]:
-    """Return what `truth_image` does, and how it is kept: what it took, and whether it was there already."""
+) -> tuple[ReferenceImage, Kept]:
+    """Return what `reference_image` does, and how it is kept: what it took, and whether it was there already."""
     key, spent = _key(scene, settings), stopwatch()
     stored = load(key)
     if stored is not None:
-        values = {each.name: _as_kept(each, stored.arrays.get(each.name)) for each in fields(TruthImage)}
-        return TruthImage(**values), stored
-    truth = read_truth(scene)
+        values = {each.name: _as_kept(each, stored.arrays.get(each.name)) for each in fields(ReferenceImage)}
+        return ReferenceImage(**values), stored
+    truth = read_reference(scene)
     parts = _Parts(key)
     # Only area lights take so long that a run is worth going on with.
     keep = parts if truth.area and settings["pixel"] == "centre" else None
@@ -82,15 +82,15 @@ def kept_truth(
     return image, stored
 
 
-def truth_of_pixels(scene, pixels: NDArray[np.integer]) -> TruthImage:
+def reference_of_pixels(scene, pixels: NDArray[np.integer]) -> ReferenceImage:
     """Return the quadrature truth of pixels of a Mitsuba scene by number, row by row, (1, count, 3); it is not kept."""
-    whole = read_truth(scene)
+    whole = read_reference(scene)
     return _checked_image(replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels]), _USUAL)
 
 
 def _checked_image(
-    truth: TruthScene, settings: Mapping[str, Any], *, keep: Keep | None = None, progress: Progress | None = None
-) -> TruthImage:
+    truth: ReferenceScene, settings: Mapping[str, Any], *, keep: Keep | None = None, progress: Progress | None = None
+) -> ReferenceImage:
     """Return the truth of an image whose every value is finite."""
     check_camera(truth)
     if settings["pixel"] == "centre":
@@ -100,12 +100,12 @@ def _checked_image(
     return image
 
 
-def keep_truth(scene, image: TruthImage, spent: Spent, *, pixel: str = "centre") -> None:
-    """Keep a truth that another process computed by `truth_image`, and what it took, so that this one finds it."""
+def keep_reference(scene, image: ReferenceImage, spent: Spent, *, pixel: str = "centre") -> None:
+    """Keep a truth that another process computed by `reference_image`, and what it took, so that this one finds it."""
     _store(_key(scene, _USUAL | {"pixel": pixel}), image, spent)
 
 
-def has_truth(scene, *, pixel: str = "centre") -> bool:
+def has_reference(scene, *, pixel: str = "centre") -> bool:
     """Return whether the truth of a scene is kept."""
     return is_kept(_key(scene, _USUAL | {"pixel": pixel}))
 
@@ -114,8 +114,8 @@ def _key(scene, settings: Mapping[str, Any]) -> str:
     return key_of("quadrature", quadrature_image, scene=scene_digest(scene), **settings)
 
 
-def _store(key: str, image: TruthImage, spent: Spent) -> Kept:
-    values = {each.name: getattr(image, each.name) for each in fields(TruthImage)}
+def _store(key: str, image: ReferenceImage, spent: Spent) -> Kept:
+    values = {each.name: getattr(image, each.name) for each in fields(ReferenceImage)}
     return store(key, {name: value for name, value in values.items() if value is not None}, spent)
 
 
@@ -140,7 +140,7 @@ def _as_kept(field: Field, value: Any) -> Any:
     return field.type(value) if field.type in (int, float) else value
 
 
-def reference_layer(truth: TruthImage, layer: str, *, emitted: bool = True) -> Array:
+def reference_layer(truth: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:
     """Return 'airlight', 'surface' or 'total', (height, width, 3) [W/(m^2 sr)].
 
     A renderer shows the area lights that the camera sees: Mitsuba's integrators do unless `hide_emitters` is set, and
@@ -155,7 +155,7 @@ def reference_layer(truth: TruthImage, layer: str, *, emitted: bool = True) -> A
     return total if truth.emitted is None or not emitted else total + truth.emitted
 
 
-def reference_error(truth: TruthImage, layer: str) -> Array | None:
+def reference_error(truth: ReferenceImage, layer: str) -> Array | None:
     """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without area lights, where it is 0.
 
     Airlight and surface have draws of their own, so that the variances of the total add up; what lights emit is exact.
@@ -167,7 +167,7 @@ def reference_error(truth: TruthImage, layer: str) -> Array | None:
     return np.asarray(getattr(truth, f"{layer}_se"))
 
 
-def check_camera(truth: TruthScene) -> None:
+def check_camera(truth: ReferenceScene) -> None:
     """Refuse a scene whose camera is at a light, whose every pixel is infinite."""
     for number, light in enumerate(truth.lights, 1):
         distance = float(np.linalg.norm(light.position - truth.origin))
@@ -178,7 +178,7 @@ def check_camera(truth: TruthScene) -> None:
             )
 
 
-def check_rays(truth: TruthScene, distance: Array) -> None:
+def check_rays(truth: ReferenceScene, distance: Array) -> None:
     """Refuse rays through pixel centres that meet a light before the visible surface, so far away, (rays,) [m]."""
     ends = np.ravel(distance)
     for number, light in enumerate(truth.lights, 1):
@@ -196,7 +196,7 @@ def check_rays(truth: TruthScene, distance: Array) -> None:
             )
 
 
-def check_values(truth: TruthScene, image: TruthImage) -> None:
+def check_values(truth: ReferenceScene, image: ReferenceImage) -> None:
     """Refuse a truth that is not finite, by its first pixel."""
     for what in ("airlight", "airlight_bound", "surface"):
         values: Any = getattr(image, what)
@@ -210,23 +210,23 @@ def check_values(truth: TruthScene, image: TruthImage) -> None:
             )
 
 
-def _name(number: int, light: TruthLight) -> str:
+def _name(number: int, light: ReferenceLight) -> str:
     return f"light {number} at ({', '.join(f'{coordinate:g}' for coordinate in light.position)})"
 
 
-def _uncertainty(truth: TruthScene, light: TruthLight) -> float:
+def _uncertainty(truth: ReferenceScene, light: ReferenceLight) -> float:
     """Return how well the distance from the camera to a light is known [m]."""
     return _ROUNDING * float(max(np.abs(light.position).max(), np.abs(truth.origin).max()))
 
 
-def _scatters(truth: TruthScene, light: TruthLight) -> bool:
+def _scatters(truth: ReferenceScene, light: ReferenceLight) -> bool:
     """Return whether there is a medium where a light is: beside it the airlight is finite."""
     inside = [medium for medium in truth.media if holds(medium.bounds, light.position)]
     medium = inside[0] if inside else truth.medium
     return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))
 
 
-def _looks_along(light: TruthLight, direction: Array) -> NDArray[np.bool_]:
+def _looks_along(light: ReferenceLight, direction: Array) -> NDArray[np.bool_]:
     """Return which rays through a light pass its cone, before it or behind it."""
     if light.axis is None:
         return np.ones(len(direction), dtype=bool)

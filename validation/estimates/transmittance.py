@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.quadrature.fields import field_of
 from reference.scene.density_grid import GridMedium
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 
 Array = NDArray[np.float64]
 Look = Callable[[Array], Array]  # shares of a ray, any shape -> optical depth of the whole ray if all were as there
@@ -103,7 +103,7 @@ def ratio_tracking(look: Look, random: np.random.Generator, times: int, majorant
 
 
 def transmittance_errors(
-    truth: TruthScene,
+    truth: ReferenceScene,
     steps: Sequence[int],
     *,
     progress: Callable[[float, str], None] | None = None,

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError, nearest
 from analytic.height_fog import HeightFog
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from validation.fog_model.radiance import Fog
 from validation.fog_model.view import light_sources
 
@@ -105,7 +105,7 @@ class Unknown:
 
 
 def read_unknowns(
-    names: Sequence[str], truth: TruthScene, fog: Fog, starts: Mapping[str, float]
+    names: Sequence[str], truth: ReferenceScene, fog: Fog, starts: Mapping[str, float]
 ) -> tuple[Unknown, ...]:
     """Return the parameters that names stand for.
 
@@ -141,7 +141,7 @@ def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[float] | 
     return fog
 
 
-def _read(name: str, truth: TruthScene, fog: Fog) -> list[Unknown]:
+def _read(name: str, truth: ReferenceScene, fog: Fog) -> list[Unknown]:
     word, _, place = name.partition(":")
     kind, channels = word, tuple(range(3))
     for channel, letter in enumerate(CHANNELS):
@@ -168,7 +168,7 @@ def _read(name: str, truth: TruthScene, fog: Fog) -> list[Unknown]:
     return [_of_light(kind, number, truth) for number in _lights(name, place, kind, truth)]
 
 
-def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: TruthScene, fog: Fog) -> list[Unknown]:
+def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: ReferenceScene, fog: Fog) -> list[Unknown]:
     several = len(_scattering(fog)) > 1
     ending = f":{_medium_name(number, truth)}" if several else ""
     if kind == "phase.g":
@@ -197,7 +197,7 @@ def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: TruthSc
     ]
 
 
-def _of_light(kind: str, number: int, truth: TruthScene) -> Unknown:
+def _of_light(kind: str, number: int, truth: ReferenceScene) -> Unknown:
     names = light_names(truth)
     name = kind + (f":{names[number]}" if len(names) > 1 else "")
     if kind == "intensity":
@@ -235,21 +235,21 @@ def _scattering(fog: Fog) -> list[int]:
     return [number for number, sigma_t in enumerate(fog.sigma_t) if max(sigma_t) > 0]
 
 
-def _medium_name(number: int, truth: TruthScene) -> str:
+def _medium_name(number: int, truth: ReferenceScene) -> str:
     return "medium" if number == 0 else truth.media[number - 1].name
 
 
-def light_names(truth: TruthScene) -> list[str]:
+def light_names(truth: ReferenceScene) -> list[str]:
     """Return the ids of the lights, in the order of their paths."""
     return [source.name for source in light_sources(truth)]
 
 
-def _media(name: str, place: str, truth: TruthScene, fog: Fog) -> list[int]:
+def _media(name: str, place: str, truth: ReferenceScene, fog: Fog) -> list[int]:
     there = _scattering(fog)
     return _chosen(name, place, there, [_medium_name(number, truth) for number in there], "medium")
 
 
-def _lights(name: str, place: str, kind: str, truth: TruthScene) -> list[int]:
+def _lights(name: str, place: str, kind: str, truth: ReferenceScene) -> list[int]:
     names = light_names(truth)
     numbers = list(range(len(names)))
     if kind != "intensity" and not place:

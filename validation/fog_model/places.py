@@ -35,7 +35,7 @@ from reference.quadrature.segments import camera_segments
 from reference.quadrature.unbounded import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.visibility.line_crossings import crossings
 from reference.visibility.planes import falloff, rays_at
 
@@ -91,7 +91,7 @@ def no_places(media: int, *, surface: bool) -> Places:
 
 
 def point_nodes(
-    truth: TruthScene, light: TruthLight, reach: LitRays, ends: tuple[Array, Array] | None = None
+    truth: ReferenceScene, light: ReferenceLight, reach: LitRays, ends: tuple[Array, Array] | None = None
 ) -> Places:
     """Return the nodes of a point or spot light, or of a sample of an area light.
 
@@ -145,7 +145,7 @@ def point_nodes(
 
 
 def parallel_nodes(
-    truth: TruthScene, light: DirectionalLight, reach: LitRays, ends: tuple[Array, Array] | None = None
+    truth: ReferenceScene, light: DirectionalLight, reach: LitRays, ends: tuple[Array, Array] | None = None
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
     rays = reach.rays
@@ -171,7 +171,7 @@ def parallel_nodes(
 
 
 def surface_points(
-    truth: TruthScene, light: TruthLight | DirectionalLight, distance: Array, reflected: Array, lit: Bools
+    truth: ReferenceScene, light: ReferenceLight | DirectionalLight, distance: Array, reflected: Array, lit: Bools
 ) -> Places:
     """Return the visible surface points that a light reaches: L = f(w_i, w_o) cos I profile / r^2.
 
@@ -236,7 +236,7 @@ def panel_nodes(
     return owner[by_owner], np.concatenate(places)[by_owner], np.concatenate(weights)[by_owner]
 
 
-def lengths(truth: TruthScene, origin: Array, direction: Array, reach: Array) -> Array:
+def lengths(truth: ReferenceScene, origin: Array, direction: Array, reach: Array) -> Array:
     """Return how much of straight lines lies in each medium, that without bounds first, (n, media) [m].
 
     Parameters
@@ -254,7 +254,7 @@ def lengths(truth: TruthScene, origin: Array, direction: Array, reach: Array) ->
     return np.stack([np.maximum(around, 0.0), *inside], axis=1)
 
 
-def _by_height(truth: TruthScene, stretches: tuple[Index, Array, Array]) -> Pieces:
+def _by_height(truth: ReferenceScene, stretches: tuple[Index, Array, Array]) -> Pieces:
     """Cut lit stretches where rays cross heights at which the density of height fog has kinks."""
     medium = truth.medium
     assert isinstance(medium, HeightMedium)
@@ -266,7 +266,7 @@ def _by_height(truth: TruthScene, stretches: tuple[Index, Array, Array]) -> Piec
     return cut(whole(stretches), (ray, x[number, ray]))
 
 
-def _heights(truth: TruthScene, ray: Index, x: Array) -> Array:
+def _heights(truth: ReferenceScene, ray: Index, x: Array) -> Array:
     """Return the heights at distances along rays [m]."""
     assert isinstance(truth.medium, HeightMedium)
     up = truth.medium.up
@@ -281,7 +281,7 @@ def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
 
 
 def _before_sun(
-    truth: TruthScene, light: DirectionalLight, stretches: tuple[Index, Array, Array]
+    truth: ReferenceScene, light: DirectionalLight, stretches: tuple[Index, Array, Array]
 ) -> tuple[Pieces, Array]:
     """Return pieces of lit stretches in height fog, and how long each is in optical depths and in height."""
     medium = truth.medium
@@ -302,7 +302,7 @@ def _before_sun(
     return pieces, np.minimum(np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP)
 
 
-def _long_enough(truth: TruthScene, place: Array) -> float:
+def _long_enough(truth: ReferenceScene, place: Array) -> float:
     """Return how far behind its foot point from a place an unbounded ray is followed [m]."""
     if isinstance(truth.medium, HeightMedium):
         fog = fog_of(truth.medium)
@@ -314,7 +314,7 @@ def _long_enough(truth: TruthScene, place: Array) -> float:
     return float(_NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min())) if np.any(sigma_t > 0) else 0.0
 
 
-def _profile(light: TruthLight, direction: Array) -> Array:
+def _profile(light: ReferenceLight, direction: Array) -> Array:
     """Return the profile of a light in directions away from it, (n,): on a ray along each, straight ahead."""
     if light.axis is None:
         return np.ones(len(direction))

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from analytic.height_fog import HeightFog
 from reference.quadrature.height_fog import fog_of
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 from validation.fog_model.places import AROUND, Places
 from validation.fog_model.view import ScatteringPaths
 
@@ -82,7 +82,7 @@ class Fog:
         return np.asarray(np.einsum("kl,klpc->kpc", factors, by_light) * np.array(self.exposure))
 
 
-def scene_fog(truth: TruthScene) -> Fog:
+def scene_fog(truth: ReferenceScene) -> Fog:
     """Return the fog as the scene has it."""
     media, medium = (truth.medium, *truth.media), truth.medium
     height, up = (fog_of(medium), colour(medium.up)) if isinstance(medium, HeightMedium) else (None, (0.0, 0.0, 1.0))

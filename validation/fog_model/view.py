@@ -17,12 +17,12 @@ from reference.quadrature.light_airlight import lit_parallel_rays, lit_rays
 from reference.quadrature.light_points import light_points
 from reference.quadrature.replicates import PointPlan, square_points
 from reference.quadrature.surface import surface_hits
-from reference.scene.area_light import TruthAreaLight, is_area
+from reference.scene.area_light import ReferenceAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.device import as_rows, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthLight, TruthMedium, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene
 from reference.scene.shapes import read_shapes
 from reference.scene.varying import VaryingMedium
 from reference.visibility.before_light import before_light
@@ -34,7 +34,7 @@ from validation.fog_model.places import Places, lengths, no_places, parallel_nod
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Light = TruthLight | DirectionalLight
+Light = ReferenceLight | DirectionalLight
 Progress = Callable[[float, str], None]
 
 SAMPLES = 16  #: of an area light
@@ -45,7 +45,7 @@ _FEW = 1000  # rays
 class View:
     """The rays of some pixels."""
 
-    truth: TruthScene  #: the scene, with these rays in the place of its own
+    truth: ReferenceScene  #: the scene, with these rays in the place of its own
     pixels: Index  #: numbers of the pixels, row by row, ascending, (m,)
     ray_pixel: Index  #: by ray, which of these it belongs to, (rays,)
     axis: Array  #: of the camera, unit, (3,)
@@ -61,7 +61,7 @@ class View:
         near, far = (np.broadcast_to(plane * slant, self.distance.shape) for plane in planes)
         return near, far
 
-    def reach(self, light: Light, *, shadows: bool, area: TruthAreaLight | None) -> Any:
+    def reach(self, light: Light, *, shadows: bool, area: ReferenceAreaLight | None) -> Any:
         """Return which parts of the rays a light reaches; the shape of an area light does not shadow its samples."""
 
         def found() -> Any:
@@ -80,7 +80,7 @@ class View:
 
         return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
 
-    def _ball(self, light: TruthLight, area: TruthAreaLight | None) -> Ball:
+    def _ball(self, light: ReferenceLight, area: ReferenceAreaLight | None) -> Ball:
         """Return what holds a light, and others that are asked for: shapes near rays are looked for once for all.
 
         This takes a millisecond a ray, which the places of a light that moves are worth where rays are few.
@@ -134,7 +134,7 @@ def _place_of(light: Light) -> tuple[Any, ...]:
 
 
 def view_of(
-    truth: TruthScene,
+    truth: ReferenceScene,
     pixels: Index | None = None,
     *,
     rays_per_side: int = 0,
@@ -194,13 +194,13 @@ class ScatteringPaths:
     """All paths of some pixels of an image."""
 
     view: View
-    media: tuple[TruthMedium | VaryingMedium, ...]  #: that without bounds first
+    media: tuple[ReferenceMedium | VaryingMedium, ...]  #: that without bounds first
     lights: tuple[LightPaths, ...]
 
 
 def scattering_paths(
     view: View,
-    lights: Sequence[TruthLight] | None = None,
+    lights: Sequence[ReferenceLight] | None = None,
     *,
     radius: float = 0.0,
     blend: float = 0.0,
@@ -260,10 +260,10 @@ class Source:
     intensity: Array  #: what multiplies the paths from it, (3,)
     lights: Sequence[Light]  #: that stand for it
     centre: Array | None = None  #: of a sphere, (3,) [m]
-    area: TruthAreaLight | None = None  #: that has this extent in the scene
+    area: ReferenceAreaLight | None = None  #: that has this extent in the scene
 
 
-def light_sources(truth: TruthScene, samples: int = SAMPLES, seed: int = 0, radius: float = 0.0) -> list[Source]:
+def light_sources(truth: ReferenceScene, samples: int = SAMPLES, seed: int = 0, radius: float = 0.0) -> list[Source]:
     """Return the lights of a scene: point and spot lights, directional ones, then area lights.
 
     The parameters are those of `scattering_paths`.
@@ -292,13 +292,13 @@ def light_sources(truth: TruthScene, samples: int = SAMPLES, seed: int = 0, radi
     return [*near, *far, *wide]
 
 
-def _as_sphere(name: str, light: TruthLight, plan: PointPlan, radius: float) -> Source:
+def _as_sphere(name: str, light: ReferenceLight, plan: PointPlan, radius: float) -> Source:
     """Return a sphere of a point light's intensity.
 
     Seen from anywhere, a sphere of the radiance L has the intensity L pi R^2; one of N points on it stands for the area
     4 pi R^2/N, of the intensity L 4 pi R^2/N along its normal: four times that of the light over N.
     """
-    wide = TruthAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
+    wide = ReferenceAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
     samples = light_points(wide, square_points(plan, 0, 0, "sphere"))
     return Source(name, 4 * light.intensity / plan.most, samples, light.position)
 
@@ -306,13 +306,13 @@ def _as_sphere(name: str, light: TruthLight, plan: PointPlan, radius: float) -> 
 def _edged(places: Places, light: Light, source: Source, blend: float) -> Places:
     """Return places with the edge of a spot as Blender has it, and as a sphere lights them that samples stand for."""
     factor = _blended(places.towards, light) if blend else 1.0
-    if source.centre is not None and isinstance(light, TruthLight):
+    if source.centre is not None and isinstance(light, ReferenceLight):
         level = _level(places, light, source, source.centre)
         factor = np.divide(factor, level, out=np.zeros_like(level), where=level > 0)  # no sample sends to the others
     return places if np.ndim(factor) == 0 else replace(places, value=places.value * np.asarray(factor)[:, None])
 
 
-def _level(places: Places, light: TruthLight, sphere: Source, centre: Array) -> Array:
+def _level(places: Places, light: ReferenceLight, sphere: Source, centre: Array) -> Array:
     """Return what the samples of a sphere together send to places, as a multiple of what the sphere sends there, (n,).
 
     At the distance r from its centre a sphere of the radius R and the radiance L has the solid angle
@@ -320,7 +320,7 @@ def _level(places: Places, light: TruthLight, sphere: Source, centre: Array) -> 
     at the distances d_i along v_i stand for the area 4 pi R^2/N each, and give 4 pi R^2 L/N sum max(n_i.v_i, 0)/d_i^2,
     each times the cosine to the way from the centre on such an area. Sixteen samples are 10 % off.
     """
-    own = [each for each in sphere.lights if isinstance(each, TruthLight)]
+    own = [each for each in sphere.lights if isinstance(each, ReferenceLight)]
     place = light.position - centre + places.r[:, None] * places.towards
     radius, r = float(np.linalg.norm(light.position - centre)), np.linalg.norm(place, axis=1)
     starts, normals = (

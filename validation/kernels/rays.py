@@ -62,7 +62,7 @@ def hard_rays(count: int = 100_000) -> Cases:
         ["near_light", "infinite", "behind", "thick", "thin", "sliver", "beyond"],
         "generic",
     )
-    return with_truth(table(phase, g, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
+    return with_reference(table(phase, g, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
 
 
 def slivers(count: int = 8192) -> Cases:
@@ -77,7 +77,7 @@ def slivers(count: int = 8192) -> Cases:
     phase = np.where(u[:, 5] < 0.5, "isotropic", "rayleigh")
     tags = np.full(count, "sliver")
     zero = np.zeros(count)
-    return with_truth(table(phase, zero, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
+    return with_reference(table(phase, zero, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
 
 
 def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bool = True) -> Cases:
@@ -91,7 +91,7 @@ def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bo
     g_exact = np.full(count, float(np.float32(g)))
     zeros, ones = np.zeros(count), np.ones(count)
     cases = table(names, g_exact, foot=foot, height=height, x0=zeros, x1=x1, sigma_t=ones, tags=np.full(count, "wide"))
-    return with_truth(cases) if truth else cases
+    return with_reference(cases) if truth else cases
 
 
 def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags) -> Cases:
@@ -100,11 +100,11 @@ def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t
     return Cases(names, np.asarray(g), foot, height, x0, x1, sigma_t, None, words, None, None, None, COLUMNS, ())
 
 
-def with_truth(cases: Cases) -> Cases:
+def with_reference(cases: Cases) -> Cases:
     """Return cases with J to about 1e-12, from the cache where it was computed before."""
     columns = (cases.g, cases.foot, cases.height, cases.x0, cases.x1, cases.sigma_t)
-    key = key_of("kernel-rays", _truth, columns=columns, phases=cases.phase)
-    return replace(cases, value=kept(key, lambda: {"value": _truth(cases)}).arrays["value"])
+    key = key_of("kernel-rays", _reference, columns=columns, phases=cases.phase)
+    return replace(cases, value=kept(key, lambda: {"value": _reference(cases)}).arrays["value"])
 
 
 def case_row(cases: Cases, k: int) -> str:
@@ -117,7 +117,7 @@ def case_row(cases: Cases, k: int) -> str:
     return ",".join([cases.tag[k] if cases.tag else "", cases.phase[k], *words, value])
 
 
-def _truth(cases: Cases) -> Array:
+def _reference(cases: Cases) -> Array:
     value = np.empty(len(cases.x0))
     names = np.asarray(cases.phase)
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):

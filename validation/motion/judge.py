@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.scene.camera import film_positions
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import ReferenceScene, read_reference
 from reference.storage.exr import NOTE, read_exr
 from reference.storage.files import temporary_folder
 from validation.engine.judge import lamp_distance, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import PIXELS, Progress, pixel_kinds, scene_of_size
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import plain
 from validation.motion.blocks import BLOCK, told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
@@ -228,7 +228,7 @@ class _Frames:
         shape = (record.frames, *judged.values.shape[:2])
         self._uncovered, self._beside = np.zeros((2, *shape), dtype=bool)
         self._ages = np.full(shape[1:], math.inf)  # of the last frame, since a point was disoccluded
-        self._seen: TruthScene | None = None  # in the last frame
+        self._seen: ReferenceScene | None = None  # in the last frame
         self._distance = np.zeros(shape[1:])
         self._shown: list[int] = []  # the frame that has the same reference first
 
@@ -253,14 +253,14 @@ class _Frames:
                 loaded = load_scene(self._scene, self._judged.size, changes)
                 move_shapes(loaded.scene, moves)
                 shift_film(loaded.scene, *jitter)
-                image = truth_image(loaded.scene, pixel=self._pixel)
+                image = reference_image(loaded.scene, pixel=self._pixel)
             except InputError as error:
                 raise InputError(f"frame {n}: {error}") from error
             self._shown.append(n)
             self.reference_error = max(self.reference_error, relative_bound(image))
             np.save(self._folder / f"reference-{n}.npy", expected_layer(image, self._judged))
             self._beside[n] = lamp_distance(loaded, image) <= _BESIDE
-            self._uncover(image.distance, read_truth(loaded.scene))
+            self._uncover(image.distance, read_reference(loaded.scene))
         self._uncovered[n] = self._ages <= _RECENT
 
     @property
@@ -288,7 +288,7 @@ class _Frames:
             self._record.resets,
         )
 
-    def _uncover(self, distance: Array, here: TruthScene) -> None:
+    def _uncover(self, distance: Array, here: ReferenceScene) -> None:
         """Tell how many frames ago the point of each pixel was disoccluded; this frame differs from the one before."""
         before, self._seen = self._seen, here
         there, self._distance = self._distance, distance
@@ -308,7 +308,7 @@ def _blocks(some: Bools) -> slice:
     return slice(places[0] // BLOCK * BLOCK, (places[-1] // BLOCK + 1) * BLOCK)
 
 
-def _pixel_of(truth: TruthScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
+def _pixel_of(truth: ReferenceScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
     """Return row and column of the pixels that show points, and whether these lie in the image."""
     size = truth.width, truth.height
     place = np.floor(film_positions(truth.scene.sensors()[0], points - truth.origin, size))

@@ -42,7 +42,7 @@ from scipy.stats import nct, t
 from analytic.errors import InputError
 from reference.storage.exr import read_exr
 from validation.engine.images import image_times
-from validation.engine.judge import relative_bound, truths
+from validation.engine.judge import references, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import Progress, pixel_kinds, scene_of_size
 from validation.metrics.errors import plain
@@ -349,7 +349,7 @@ def compare_runs(
                 f"{path} has {each.size[0]} x {each.size[1]} pixels, {paths[0]} {first.size[0]} x {first.size[1]}"
             )
     loaded = scene_of_size(scene, first.size, paths[0])
-    reference_of = truths(loaded, progress)
+    reference_of = references(loaded, progress)
     runs = np.array([each.values for each in layers], dtype=np.float64)
     finite = np.isfinite(runs).all(axis=0)
 

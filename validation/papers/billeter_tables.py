@@ -29,7 +29,7 @@ from realtime.methods.light_volumes.published.mesh import tessellation_stages
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import TruthScene, read_truth
+from reference.scene.read import ReferenceScene, read_reference
 from validation.clock import time_repeated, timed
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene, resize
@@ -71,7 +71,7 @@ def _images(size: tuple[int, int]) -> dict[str, Any]:
     for scene_name in dict.fromkeys(scene_name for scene_name, *_ in IMAGES.values()):
         loaded = load_scene(scene_name, size).scene
         scene = read_scene(loaded)
-        true = quadrature_image(sampled_truth(read_truth(loaded), stride)).airlight
+        true = quadrature_image(sampled_reference(read_reference(loaded), stride)).airlight
         for name, (where, method, values) in IMAGES.items():
             if where == scene_name:
                 renderer = partial(prepared, scene, configuration(method, "exact", values))
@@ -94,7 +94,7 @@ def sampled(image: Array, stride: int) -> Array:
     return image[stride // 2 :: stride, stride // 2 :: stride]
 
 
-def sampled_truth(truth: TruthScene, stride: int) -> TruthScene:
+def sampled_reference(truth: ReferenceScene, stride: int) -> ReferenceScene:
     """Return the scene with the rays of only those pixels that `sampled` takes."""
     direction = sampled(truth.direction.reshape(truth.height, truth.width, 3), stride)
     height, width, _ = direction.shape

@@ -29,7 +29,7 @@ from realtime.methods.shadow_planes.silhouettes import components_in_view, silho
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
 from validation.clock import Timing, time_in_turns
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene
 from validation.study.configuration import Configuration, configuration, prepared
@@ -63,7 +63,7 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         size, compared = _scaled(full, scale), _scaled(_COMPARED, scale)
         scene = read_scene(load_scene(scene_name, size).scene)
         small = load_scene(scene_name, compared).scene
-        truth = truth_image(small)
+        truth = reference_image(small)
         whole = truth.airlight + truth.surface
         chosen = as_published("taylor", white=float(np.quantile(whole.max(axis=-1), 0.999)), cone=cone)
         frame = render_frame(prepared(read_scene(small), chosen))

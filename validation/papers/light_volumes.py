@@ -32,9 +32,9 @@ from realtime.methods.light_volumes.published.tessellation import configuration,
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from validation.clock import time_in_turns
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.meshes import lathe, placed
@@ -58,7 +58,7 @@ _HALVINGS = 24  # of the interval of the threshold
 def maps() -> dict[str, float]:
     """Return the errors of the mesh in `omni-box` by size of the map, and of the image of 128 texels to that of 512."""
     loaded = load_scene("omni-box", SIZE).scene
-    scene, true = read_scene(loaded), truth_image(loaded).airlight
+    scene, true = read_scene(loaded), reference_image(loaded).airlight
     images = {size: render_frame(_renderer(scene, "mesh", size)).airlight for size in _MAPS}
     errors = {str(size): error_metrics(true, image).relative_rmse for size, image in images.items()}
     return errors | {"128 to 512": error_metrics(images[512], images[128]).relative_rmse}
@@ -216,7 +216,7 @@ def _filter_errors(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Arra
 def _biased() -> list[float]:
     """Return for each bias the relative RMSE of the sum with depth testing to the sum with clamped depths."""
     loaded = load_scene("omni-box", _BIAS_SIZE).scene
-    scene, truth = read_scene(loaded), read_truth(loaded)
+    scene, truth = read_scene(loaded), read_reference(loaded)
     light = scene.lights[0]
     depth = render_frame(_renderer(scene, "mesh", _BIAS_MAP)).distance.astype(np.float64).ravel()
     foot, height = foot_and_height(truth.origin, truth.direction, truth.lights[0].position)

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from analytic.geometry import foot_and_height
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_truth
-from validation.estimates.quadrature import truth_image
+from reference.scene.read import read_reference
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera, fog, point_light
@@ -39,7 +39,7 @@ _RAYS = 4000  # of the stencil
 def orders() -> dict[str, float]:
     """Return the errors without shadows, without an order of the planes, and in the paper's order."""
     paper = {scene: _error(scene, {"order": "paper"}) for scene in SCENES}
-    unshadowed = error_metrics(_truth("hall"), _rendered("hall", {}, method="unshadowed"))
+    unshadowed = error_metrics(_reference("hall"), _rendered("hall", {}, method="unshadowed"))
     return {
         "hall, unshadowed": unshadowed.relative_rmse,
         "clutter, no order": _error("clutter", {"order": "none"}).relative_rmse,
@@ -56,7 +56,7 @@ def shortcuts() -> dict[str, float]:
     8-bit buffer in `clutter`, over the pixels whose truth is below white, which is a quarter of the brightest airlight
     of 99 % of the pixels, and four times as much.
     """
-    true = _truth("clutter")
+    true = _reference("clutter")
     brightest = float(np.percentile(true.max(axis=2), 99))
     biases = {}
     for name, white in (("bright", brightest / 4), ("dim", 4 * brightest)):
@@ -95,17 +95,17 @@ def _lamp_in_fog(depth: float) -> dict[str, Any]:
 
 
 def _close_to_lamp(scene: Any) -> NDArray[np.bool_]:
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     foot, height = foot_and_height(truth.origin, truth.direction, truth.lights[0].position)
     return (np.arctan2(height, foot) < np.radians(10)).reshape(truth.height, truth.width)
 
 
 def _error(scene: str, values: Mapping[str, Any]) -> Metrics:
-    return error_metrics(_truth(scene), _rendered(scene, values))
+    return error_metrics(_reference(scene), _rendered(scene, values))
 
 
-def _truth(scene: str) -> Array:
-    return truth_image(load_scene(scene, SIZE).scene).airlight
+def _reference(scene: str) -> Array:
+    return reference_image(load_scene(scene, SIZE).scene).airlight
 
 
 def _rendered(scene: str, values: Mapping[str, Any], method: str = "shadow-planes") -> Array:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from realtime.frame.renderer import render_frame, run_cast_and_shade
 from realtime.scene.read_scene import Scene, read_scene
 from validation.clock import Timing, time_in_turns
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 from validation.study.configuration import SHARED_POINTS, Configuration, prepared
 from validation.study.frame_times import moved_light
@@ -118,7 +118,7 @@ def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[s
 def shafts_reference(size: tuple[int, int]) -> Reference:
     """Return the quadrature of the scene and its penumbra."""
     loaded = load_scene(SCENE, size).scene
-    truth = truth_image(loaded)
+    truth = reference_image(loaded)
     image = np.asarray(truth.airlight + truth.surface, dtype=np.float64)
     return Reference(image, penumbra(read_scene(loaded)))
 

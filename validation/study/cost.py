@@ -19,12 +19,12 @@ LONGEST = 3600.0  #: seconds that a command may be expected to take without bein
 
 _STEP = 40e-9  # of a marched ray [s]
 _RAY = 2e-6  # of any other method, by light [s]
-_TRUTH = 100e-6  # of the quadrature, by ray [s]
+_REFERENCE = 100e-6  # of the quadrature, by ray [s]
 _SAMPLE = 1e-6  # of single-scatter and volpath [s]
 _PATH = 20e-6  # of a path through a cloud [s]
 _GPU = 100.0  # threads that a GPU is worth
 TIMED = 8  #: frames that timing takes where they are slow
-_FRAME_BYTES, _TRUTH_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
+_FRAME_BYTES, _REFERENCE_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ def frame_work(size: tuple[int, int], *, lights: int = 1, steps: float = 0, fram
     return Work(frames * pixels * max(lights, 1) * max(steps * _STEP, _RAY), pixels * _FRAME_BYTES)
 
 
-def truth_work(size: tuple[int, int], *, lights: int = 1, images: float = 1) -> Work:
+def reference_work(size: tuple[int, int], *, lights: int = 1, images: float = 1) -> Work:
     """Return the work of some images of the quadrature reference."""
     pixels = float(size[0]) * size[1]
-    return Work(images * pixels * max(lights, 1) * _TRUTH, pixels * _TRUTH_BYTES)
+    return Work(images * pixels * max(lights, 1) * _REFERENCE, pixels * _REFERENCE_BYTES)
 
 
 def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False) -> Work:

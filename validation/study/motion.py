@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from realtime.frame.renderer import FrameRenderer
 from realtime.scene.read_scene import Scene, read_scene
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.motion.judge import motion_verdict
 from validation.motion.measures import Sequence as Frames
 from validation.motion.measures import measure
@@ -114,7 +114,7 @@ def light_references(
         if number < len(places):
             if progress is not None:
                 progress(number, "references")
-            references.append(truth_image(scene).airlight)
+            references.append(reference_image(scene).airlight)
     return references
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.motion.noise import Noise, measure_error, measure_noise
 from validation.study.configuration import Configuration, prepared
 from validation.study.frame_times import brief_times
@@ -57,7 +57,7 @@ def method_noise(
     """
     if runs < 2:
         raise InputError(f"runs: got {runs}, wanted at least two")
-    read, reference = read_scene(scene), truth_image(scene).airlight
+    read, reference = read_scene(scene), reference_image(scene).airlight
     found = []
     for number, chosen in enumerate(configurations):
         renderer = prepared(read, chosen)

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.quadrature.ray_values import TruthImage, ray_values
+from reference.quadrature.ray_values import ReferenceImage, ray_values
 from reference.quadrature.replicates import PointPlan, standard_error
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.kept import Spent, kept, key_of, stopwatch
 from reference.storage.scene_digest import scene_digest
-from validation.estimates.quadrature import check_camera, check_rays, truth_image
+from validation.estimates.quadrature import check_camera, check_rays, reference_image
 from validation.metrics.errors import FLOOR
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
@@ -73,7 +73,7 @@ class Reference:
         )
 
 
-def of_image(image: TruthImage, spent: Spent = _UNKNOWN) -> Reference:
+def of_image(image: ReferenceImage, spent: Spent = _UNKNOWN) -> Reference:
     """Return a quadrature image as the reference of cells."""
     return Reference(image.airlight, image.airlight_bound, image.surface, None, image.transitions, spent)
 
@@ -87,7 +87,7 @@ def cell_reference(loaded: LoadedScene) -> Reference:
     """Return the reference of a loaded scene, from the cache where it was computed before."""
     if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
         spent = stopwatch()
-        return of_image(truth_image(loaded.scene), spent())
+        return of_image(reference_image(loaded.scene), spent())
     key = key_of("sweep-reference", sampled_reference, scene=scene_digest(loaded.scene))
     result = kept(key, lambda: sampled_reference(loaded.scene))
     some = result.arrays
@@ -96,7 +96,7 @@ def cell_reference(loaded: LoadedScene) -> Reference:
 
 def sampled_reference(scene) -> dict[str, Array]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     check_camera(truth)
     count = truth.height * truth.width
     mask = np.zeros(count, dtype=bool)

@@ -21,18 +21,18 @@ from numpy.typing import NDArray
 from realtime.frame.renderer import Frame
 from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image
 from reference.storage.kept import Kept, is_kept, key_of
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.estimates.quadrature import has_truth, kept_truth, truth_image
+from validation.estimates.quadrature import has_reference, kept_reference, reference_image
 from validation.metrics.errors import plain
 from validation.metrics.flip import flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
 from validation.study.configuration import Configuration, configuration_work, user_code
-from validation.study.cost import sampled_work, truth_work
+from validation.study.cost import reference_work, sampled_work
 from validation.study.reference import of_image
 from validation.study.results import Computed, Result, cached_result
 from validation.study.row import Row
@@ -73,14 +73,14 @@ class SceneStudy:
             return read_scene(scene)
 
     @cached_property
-    def kept_truth(self) -> tuple[TruthImage, Kept]:
+    def kept_reference(self) -> tuple[ReferenceImage, Kept]:
         """The quadrature reference at pixel centres, and what it took."""
-        return kept_truth(self.loaded.scene)
+        return kept_reference(self.loaded.scene)
 
     @property
-    def truth(self) -> TruthImage:
+    def truth(self) -> ReferenceImage:
         """The quadrature reference at pixel centres."""
-        return self.kept_truth[0]
+        return self.kept_reference[0]
 
     @cached_property
     def identity(self) -> str:
@@ -116,9 +116,9 @@ class SceneStudy:
         finally:
             resize(self.loaded.scene, self.size)
 
-    def truth_of(self, pixel: str) -> TruthImage:
+    def reference_of(self, pixel: str) -> ReferenceImage:
         """Return the quadrature reference at pixel centres, or its means over their areas: 'centre' or 'area'."""
-        return self.truth if pixel == "centre" else truth_image(self.loaded.scene, pixel=pixel)
+        return self.truth if pixel == "centre" else reference_image(self.loaded.scene, pixel=pixel)
 
     def cell(self, chosen: Configuration) -> Cell:
         """Return the cell of a configuration."""
@@ -128,8 +128,8 @@ class SceneStudy:
         """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
         lights = len(self.scene.lights) + 16 * len(self.scene.area_lights)
         checks, parts = self.study.checks, {"reference": 0.0}
-        if not has_truth(self.loaded.scene):
-            parts["reference"] = truth_work(self.size, lights=lights).seconds
+        if not has_reference(self.loaded.scene):
+            parts["reference"] = reference_work(self.size, lights=lights).seconds
         parts["checks"] = 0.0 if is_kept(_checks_key(self)) else len(checks.margins) * (checks.patience or 60.0)
         samples = 20 * checks.multiple[0] * checks.multiple[1]
         works = {"multiple scattering": (_multiple_key(self), sampled_work(_MULTIPLE, samples))}
@@ -161,7 +161,7 @@ class SceneResult:
     """All that a study says of a scene."""
 
     study: SceneStudy
-    reference: TruthImage
+    reference: ReferenceImage
     agreement: Mapping[str, Any]  #: by estimator and layer, `validation.estimates.agreement.Agreement` as JSON has it
     multiple: Mapping[str, Any]  #: `validation.estimates.multiple_scattering.MultipleScattering` as JSON has it
     rows: tuple[Judged, ...]
@@ -192,7 +192,7 @@ def study_scene(
     So many `workers` compute HDR-FLIP at once, each on one processor.
     """
     progress("reference")
-    truth, kept = study.kept_truth
+    truth, kept = study.kept_reference
     made = Result({}, {}, kept.made, round(kept.spent.seconds, 3), kept.loaded)
     progress("checks")
     checks = cached_result(_checks_key(study), lambda: (plain(check_reference(study, spread=spread)), {}))
@@ -326,7 +326,7 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
 def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
     from validation.engine.images import measure_image
 
-    measured = measure_image(shown, study.loaded, study.truth_of, surfaces=study.scene.features.surfaces)
+    measured = measure_image(shown, study.loaded, study.reference_of, surfaces=study.scene.features.surfaces)
     row = Row(
         scene=study.path,
         label=shown.label,

@@ -36,7 +36,7 @@ from reference.quadrature.segments import AMBIENT, camera_segments, scattering_r
 from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import normals_at
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import TruthLight, TruthMedium, TruthScene, homogeneous_around, read_truth
+from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, homogeneous_around, read_reference
 from reference.visibility.line_crossings import crossings
 from validation.study.configuration import Configuration
 
@@ -85,12 +85,12 @@ def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
     Valid for lights without extent. Wherever a ray may end: the largest x s(x) along it, whether it is lit there or
     not.
     """
-    whole = read_truth(scene)
+    whole = read_reference(scene)
     parts = np.array_split(pixels, range(_RAYS, len(pixels), _RAYS))
     return np.concatenate([_worth_of_ends(replace(whole, direction=whole.direction[part])) for part in parts])
 
 
-def _worth_of_ends(truth: TruthScene) -> Array:
+def _worth_of_ends(truth: ReferenceScene) -> Array:
     """Return what the uncertain ends of the lit intervals of all rays of `truth` are worth, (rays, 3)."""
     distance = surface_hits(truth).distance
     worth = np.zeros((len(distance), 3))
@@ -110,7 +110,7 @@ def _worth_of_ends(truth: TruthScene) -> Array:
     return _BETWEEN * END * worth
 
 
-def _ends(truth: TruthScene, distance: Array) -> tuple[Array, Array]:
+def _ends(truth: ReferenceScene, distance: Array) -> tuple[Array, Array]:
     """Return distances along rays [m], and what divides their certainty, 1/|c| [1], (places, rays) each.
 
     They are those of the ends of rays, the middles of segments in media and between them, and where rays cross bounds.
@@ -131,7 +131,7 @@ def _ends(truth: TruthScene, distance: Array) -> tuple[Array, Array]:
     return np.stack(places), np.stack(growth)
 
 
-def _angles_about(truth: TruthScene, light: TruthLight, distance: Array) -> Array:
+def _angles_about(truth: ReferenceScene, light: ReferenceLight, distance: Array) -> Array:
     """Return distances at equal angles about a light, (places, rays) [m]."""
     toward = light.position - truth.origin
     foot = truth.direction @ toward
@@ -141,13 +141,13 @@ def _angles_about(truth: TruthScene, light: TruthLight, distance: Array) -> Arra
     return np.where(angle < np.pi / 2 - 1e-6, foot + height * np.tan(angle), np.inf)
 
 
-def _equal_steps(truth: TruthScene, light: DirectionalLight, distance: Array) -> Array:
+def _equal_steps(truth: ReferenceScene, light: DirectionalLight, distance: Array) -> Array:
     """Return distances at equal steps where rays scatter, (places, rays) [m]."""
     low, high = scattering_range(camera_segments(truth, distance))
     return low + np.linspace(0, 1, _SAMPLES)[:, None] * (high - low)
 
 
-def _from_place(truth: TruthScene, light: TruthLight, point: Array) -> tuple[Array, Array]:
+def _from_place(truth: ReferenceScene, light: ReferenceLight, point: Array) -> tuple[Array, Array]:
     """Return the direction in which light arrives at points, and how much of it [W/m^2], (n, 3)."""
     leg = point - light.position
     r = np.linalg.norm(leg, axis=1)
@@ -156,13 +156,13 @@ def _from_place(truth: TruthScene, light: TruthLight, point: Array) -> tuple[Arr
     return leg, light.intensity / (r * r)[:, None] * np.exp(-depth)
 
 
-def _from_infinity(truth: TruthScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
+def _from_infinity(truth: ReferenceScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
     """As `_from_place`; nothing is taken off on the way, which is an upper bound."""
     return np.broadcast_to(light.direction, point.shape), np.broadcast_to(light.irradiance, point.shape)
 
 
 def _scattered(
-    truth: TruthScene,
+    truth: ReferenceScene,
     incident: Callable[[Array], tuple[Array, Array]],
     ray: NDArray[np.int64],
     x: Array,
@@ -180,7 +180,9 @@ def _scattered(
     return total
 
 
-def _media(truth: TruthScene, ray: NDArray[np.int64], x: Array, distance: Array) -> list[tuple[TruthMedium, Any]]:
+def _media(
+    truth: ReferenceScene, ray: NDArray[np.int64], x: Array, distance: Array
+) -> list[tuple[ReferenceMedium, Any]]:
     """Return media and which places are in them; a place at a bound is on either side of it."""
     if not truth.media:
         return [(homogeneous_around(truth), np.ones(len(x), dtype=bool))]

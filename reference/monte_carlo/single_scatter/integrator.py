@@ -22,12 +22,12 @@ from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.monte_carlo.single_scatter.estimator import ray_light
 from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.monte_carlo.single_scatter.stretches import double_ray
-from reference.scene.read import TruthScene, whole_scene
+from reference.scene.read import ReferenceScene, whole_scene
 
 _RAYS = 1 << 20  # camera rays in one kernel
 
 
-def single_scatter_batch(truth: TruthScene, seed: int, samples: int) -> Batches:
+def single_scatter_batch(truth: ReferenceScene, seed: int, samples: int) -> Batches:
     """Trace one batch along the pixel-centre rays, from the pinhole.
 
     `truth`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for

@@ -37,7 +37,7 @@ from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthMedium, TruthScene, whole_scene
+from reference.scene.read import ReferenceMedium, ReferenceScene, whole_scene
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.integer]
@@ -47,7 +47,7 @@ _VALUES = ("sigma_t.value.value", "albedo.value.value")  # what decides the numb
 
 
 def volpath_batch(
-    truth: TruthScene, seed: int, samples: int, *, max_depth: int = 2, counts: Counts | None = None
+    truth: ReferenceScene, seed: int, samples: int, *, max_depth: int = 2, counts: Counts | None = None
 ) -> Batches:
     """Trace one batch.
 
@@ -85,7 +85,7 @@ def volpath_batch(
     return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
-def _check_far(truth: TruthScene) -> None:
+def _check_far(truth: ReferenceScene) -> None:
     """Refuse fog whose light paths from infinity Mitsuba would cut: they are twice the radius of all shapes long.
 
     Those of a sky come from all directions: 60 degrees from the zenith they must leave height fog, and lower ones that
@@ -120,7 +120,7 @@ def black_surfaces(scene) -> Iterator[None]:
             shape.set_bsdf(bsdf)
 
 
-def trace(truth: TruthScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
+def trace(truth: ReferenceScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
     """Return the mean radiance of every pixel, (pixels, 3) [W/(m^2 sr)].
 
     `truth`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of each pixel, (pixels,);
@@ -148,7 +148,7 @@ def _parts(counts: Counts) -> list[slice]:
     return [slice(int(start), int(end)) for start, end in pairwise(edges)]
 
 
-def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
+def _trace_pixels(truth: ReferenceScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
     # A kernel is compiled for how the memory lies that it reads, and NumPy's lies anywhere.
     direction = dr.normalize(mi.Vector3f(truth.direction[pixels].T))
     dr.eval(direction)
@@ -168,9 +168,9 @@ def _trace_pixels(truth: TruthScene, integrator, medium, pixels: slice, seed: in
 
 
 @contextmanager
-def _grey_media(truth: TruthScene, channel: int, scattering: bool) -> Iterator[Any]:
+def _grey_media(truth: ReferenceScene, channel: int, scattering: bool) -> Iterator[Any]:
     """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
-    if isinstance(truth.medium, TruthMedium) and not truth.media:
+    if isinstance(truth.medium, ReferenceMedium) and not truth.media:
         yield _grey_medium(truth.medium, float(truth.medium.sigma_t[channel]), scattering)
         return
     own: list[tuple[Any, dict[str, Any]]] = []
@@ -205,7 +205,7 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
     parameters.update()
 
 
-def _grey_medium(medium: TruthMedium, sigma_t: float, scattering: bool):
+def _grey_medium(medium: ReferenceMedium, sigma_t: float, scattering: bool):
     return mi.load_dict(
         {
             "type": "homogeneous",

@@ -16,7 +16,7 @@ import numpy as np
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.monte_carlo.volpath.integrator import black_surfaces, trace
 from reference.scene.clouds import CloudScene
-from reference.scene.read import TruthScene
+from reference.scene.read import ReferenceScene
 
 
 def volpath_orders_batch(
@@ -28,7 +28,7 @@ def volpath_orders_batch(
     256; `sets`: names of sets of orders with their first and last order, the last `math.inf` for one without end.
     """
     check_samples(samples)
-    truth = TruthScene(
+    truth = ReferenceScene(
         scene=clouds.scene,
         occluders=clouds.occluders,
         width=clouds.width,

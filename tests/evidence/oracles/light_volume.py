@@ -48,7 +48,7 @@ from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from realtime.shadow_maps.shadow_map import ShadowMap
 from reference.quadrature.light_airlight import lit_sums
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import TruthLight, TruthScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.exact_distance import exact_distance
 from reference.visibility.planes import Rays, cone_interval, rays_at
@@ -68,7 +68,7 @@ def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray
 
 
 def oracle_airlight(
-    truth: TruthScene,
+    truth: ReferenceScene,
     shadow_maps: Sequence[ShadowMap],
     *,
     distance: Array | None = None,
@@ -93,7 +93,7 @@ def oracle_airlight(
     return total.reshape(truth.height, truth.width, 3)
 
 
-def _rays_of(truth: TruthScene, light: TruthLight, distance: Array) -> tuple[Rays, tuple[Array, Array]]:
+def _rays_of(truth: ReferenceScene, light: ReferenceLight, distance: Array) -> tuple[Rays, tuple[Array, Array]]:
     """Return the rays and the angles between which they can be lit: up to the surface, in the cone."""
     rays = rays_at(truth.origin, truth.direction, light.position)
     cone = cone_interval(rays, light, light.cutoff)

@@ -7,7 +7,7 @@ import pytest
 from realtime.frame.renderer import render_frame
 from realtime.frame.samples import render_samples
 from realtime.scene.read_scene import read_scene
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 from validation.study.configuration import configuration, prepared
 
@@ -22,7 +22,7 @@ def test_one_ray_is_the_frame_itself(variant, method):
 def test_the_mean_converges_to_that_over_the_pixels(variant):
     """16 rays err a quarter as much as the centre alone, by the quadrature of the means over pixels."""
     loaded = load_scene("sphere-spot", (16, 12))
-    truth = truth_image(loaded.scene, pixel="area").airlight
+    truth = reference_image(loaded.scene, pixel="area").airlight
     renderer = prepared(read_scene(loaded.scene), configuration("shadow-planes"))
     shares = []
 

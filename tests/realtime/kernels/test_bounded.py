@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers import frames
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene
@@ -28,7 +28,7 @@ def ball(**phase):
 
 def by_hand(scene, exponent, p):
     """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every chord by adaptive quadrature."""
-    truth = read_truth(mi.load_dict(scene))
+    truth = read_reference(mi.load_dict(scene))
     light = truth.lights[0]
     image = np.zeros(len(truth.direction))
     for pixel, direction in enumerate(truth.direction):

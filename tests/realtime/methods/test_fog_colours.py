@@ -11,7 +11,7 @@ from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.height_fog import LAMP, SUN, fog_xml
 from validation.scenes.loading import load_scene
 
@@ -84,5 +84,5 @@ def test_local_lights_alone_are_refused(scene):
 @pytest.mark.claim("fog-colours", tolerance="a factor of 2 to 8 in the mean")
 def test_ambient_light_over_ground_is_too_bright(scene):
     loaded = scene(DARK, SKY)
-    exact_light = quadrature_image(read_truth(loaded), checks=0).airlight.mean()
+    exact_light = quadrature_image(read_reference(loaded), checks=0).airlight.mean()
     assert 2 < shown(loaded, "wenzel").airlight.mean() / exact_light < 8

@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.frames import frame, relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 
@@ -26,7 +26,7 @@ def lit_by_hand(points, light, centre, radius):
 
 def runs_by_hand(scene, distance, steps, spacing):
     """Add up, cell by cell, twelve Gauss nodes of the integrand where the middle of the cell is lit."""
-    truth = read_truth(mi.load_dict(scene))
+    truth = read_reference(mi.load_dict(scene))
     light, centre, radius = truth.lights[0], np.array(scene["ball"]["center"]), scene["ball"]["radius"]
     sigma, albedo = truth.medium.sigma_t, truth.medium.albedo
     nodes, weights = np.polynomial.legendre.leggauss(12)

@@ -8,7 +8,7 @@ import pytest
 from reference.monte_carlo.allocation import EQUAL, allocated
 from reference.monte_carlo.batches import LAYERS, merged, single_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 
 SHAPE = (6, 8)
@@ -44,7 +44,7 @@ def test_the_mean_is_the_same_and_spreads_less(variant):
     less than 4 of their standard errors (1 in 16 000 by chance), and a smaller error of the image mean for the
     airlight.
     """
-    truth = read_truth(mi.load_dict(tiny_scene(size=(12, 9))))
+    truth = read_reference(mi.load_dict(tiny_scene(size=(12, 9))))
     shape = (truth.height, truth.width)
     masks = {layer: np.ones(shape, dtype=bool) for layer in LAYERS}
 
@@ -71,7 +71,7 @@ def test_the_mean_is_the_same_and_spreads_less(variant):
 
 def test_counts_are_those_of_each_pixel(variant):
     """A pixel with as many samples as it had in a batch of its own scene has the same law; one part or many agree."""
-    truth = read_truth(mi.load_dict(tiny_scene(size=(4, 3))))
+    truth = read_reference(mi.load_dict(tiny_scene(size=(4, 3))))
     counts = np.stack([np.arange(1, 13), np.arange(12, 0, -1)]).astype(np.uint32)
     batch = volpath_batch(truth, 5, 8, counts=counts)
     assert batch.mean.shape == (2, 12, 3)

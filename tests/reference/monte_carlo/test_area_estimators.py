@@ -13,7 +13,7 @@ from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.monte_carlo.single_scatter.stretches import double_ray
 from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.area_lights import BLACK, NULL, lamp, lit_scene, ring
 from tests.helpers.scenes import tiny_scene
 
@@ -42,11 +42,11 @@ def _lamp(kind, bsdf, *, in_view=False):
     return lamp(kind, radiance=(5.0, 4.0, 3.0), bsdf=bsdf, to_world=_at(place, target, scale))
 
 
-def _truth(**changes):
+def _reference(**changes):
     scene = tiny_scene(**changes)
     if changes.get("fog", scene) is None:
         scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
-    return read_truth(mi.load_dict(scene))
+    return read_reference(mi.load_dict(scene))
 
 
 def _run(batch, truth, samples, batches=_BATCHES):
@@ -116,7 +116,7 @@ def test_both_estimators_agree(variant, name):
     Expected: airlight and surface pooled within four standard errors, and 0.05 % for the shadow-ray epsilon.
     """
     kind, bsdf, in_view = _CASES[name]["lamp"]
-    truth = _truth(lamp=_lamp(kind, bsdf, in_view=in_view))
+    truth = _reference(lamp=_lamp(kind, bsdf, in_view=in_view))
     batches = 60 if (kind, bsdf) == ("mesh", NULL) else _BATCHES
     ours, theirs = (_run(batch, truth, 256, batches) for batch in (single_scatter_batch, volpath_batch))
     for layer in (0, 1):
@@ -133,7 +133,7 @@ def test_both_estimators_agree(variant, name):
 def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     """Rationale: without fog, Mitsuba's `direct` is a third way to the light on surfaces."""
     fog = tiny_scene()["fog"] | {"sigma_t": 0.0}
-    truth = _truth(lamp=_lamp(kind, BLACK), fog=fog)
+    truth = _reference(lamp=_lamp(kind, BLACK), fog=fog)
     ours = _run(single_scatter_batch, truth, 256)
     pixels, samples = len(truth.direction), 4096
     sampler = mi.load_dict({"type": "independent"})

@@ -16,7 +16,7 @@ from reference.quadrature.light_points import light_points
 from reference.quadrature.light_samples import samples_for_rays, sections_for_points
 from reference.quadrature.replicates import PointPlan, square_points, standard_error
 from reference.quadrature.surface import Reflection, surface_hits
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.visibility.before_light import before_light
 from reference.visibility.certificate import segments_blocked
 from reference.visibility.exact_distance import exact_distance
@@ -166,7 +166,7 @@ def test_half_a_plane_before_a_rectangle(variant):
         "cover": {"type": "rectangle", "to_world": up.translate([0, edge - 50, over]).scale([60, 50, 1]), "bsdf": GREY},
     }
     camera = up.look_at([0.3, 0.2, 0.9], [0.1, 0.15, 0.0], [0, 1, 0])
-    truth = read_truth(lit_scene(size=(16, 12), to_world=camera, medium=fog(0.0, 0.5), **shapes))
+    truth = read_reference(lit_scene(size=(16, 12), to_world=camera, medium=fog(0.0, 0.5), **shapes))
     hits = surface_hits(truth)
     hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
     x, y, _ = (truth.origin + hits.distance[:, None] * truth.direction).T
@@ -223,8 +223,8 @@ def test_surfaces_by_many_shadow_rays(variant, kind):
 
 def test_emission_is_seen_through_fog_and_not_from_behind(variant):
     light = lamp(to_world=turned((0.0, 0.0, 0.0), 0, (0.3, 0.3, 1.0)), bsdf=NULL)
-    facing = read_truth(lit_scene(size=(9, 9), to_world=turned((0.0, 0.0, 2.0), 180, (1, 1, 1)), lamp=light))
-    behind = read_truth(lit_scene(size=(9, 9), to_world=turned((0.0, 0.0, -2.0), 0, (1, 1, 1)), lamp=light))
+    facing = read_reference(lit_scene(size=(9, 9), to_world=turned((0.0, 0.0, 2.0), 180, (1, 1, 1)), lamp=light))
+    behind = read_reference(lit_scene(size=(9, 9), to_world=turned((0.0, 0.0, -2.0), 0, (1, 1, 1)), lamp=light))
     image = quadrature_image(facing, plan=fixed(2))
     assert image.emitted[4, 4] == pytest.approx(np.array([3, 2, 1]) * np.exp(-0.21 * 2), rel=1e-6)
     assert (image.emitted[0, 0] == 0).all()

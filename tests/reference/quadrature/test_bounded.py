@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.suns import CHORDS, brick, pearl, plain_airlight
 from tests.helpers.volpath import assert_volpath_agrees
@@ -18,8 +18,8 @@ FINE_TABLE = {
 }
 
 
-def truth_and_image(scene, **settings):
-    truth = read_truth(mi.load_dict(scene))
+def reference_and_image(scene, **settings):
+    truth = read_reference(mi.load_dict(scene))
     return truth, quadrature_image(truth, **settings)
 
 
@@ -67,7 +67,7 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     In fog, parts are up to 60 m long, and steps longer: 2e-7 there; with 16 times as many both agree to 3e-9.
     """
     rtol = 2e-7 if "fog" in case else 1e-8
-    truth, image = truth_and_image(CASES[case]())
+    truth, image = reference_and_image(CASES[case]())
     airlight, bound = image.airlight.reshape(-1, 3), image.airlight_bound.reshape(-1, 3)
     lit = np.flatnonzero(airlight.max(axis=1) > 0)
     assert len(lit) >= 3
@@ -82,8 +82,8 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
 def test_leg_of_the_surface_is_darkened_too(variant):
     """A lamp above the sphere: the floor below it is darker by the chord of the leg and of the view."""
     changes = {"floor": tiny_scene()["floor"], "lamp": tiny_scene()["lamp"] | {"position": [0.6, 0.4, 2.3]}}
-    truth, image = truth_and_image(clear_scene(pearl=pearl(), **changes))
-    _, clear = truth_and_image(clear_scene(pearl=pearl(0.0), **changes))
+    truth, image = reference_and_image(clear_scene(pearl=pearl(), **changes))
+    _, clear = reference_and_image(clear_scene(pearl=pearl(0.0), **changes))
     distance = clear.distance.reshape(-1)
     hit = np.isfinite(distance)
     point = truth.origin + distance[hit, None] * truth.direction[hit]
@@ -110,7 +110,7 @@ def test_camera_inside_of_a_body(variant):
     scene["sensor"] |= {"to_world": to_world, "medium": {"type": "ref", "id": "mist"}}
     scene["brick"]["interior"] = {"type": "ref", "id": "mist"}
     scene = {"type": "scene", "mist": inside} | scene
-    truth, image = truth_and_image(scene)
+    truth, image = reference_and_image(scene)
     airlight = image.airlight.reshape(-1, 3)
     assert np.all(airlight > 0)
     for pixel in (0, 27):
@@ -121,13 +121,13 @@ def test_camera_inside_of_a_body(variant):
 @pytest.mark.claim("infinite-through-the-light")
 def test_ray_through_a_lamp(variant):
     """In a vacuum between two bodies a ray may meet the lamp: the airlight is finite. Inside of one it is infinite."""
-    truth, _ = truth_and_image(clear_scene(size=(12, 9), brick=brick()))
+    truth, _ = reference_and_image(clear_scene(size=(12, 9), brick=brick()))
     near, far = CHORDS["brick"](truth.origin, truth.direction)
     pixel = int(np.argmax(far - near))
     for distance in (0.5 * near[pixel], 0.5 * (near + far)[pixel]):
         position = truth.origin + distance * truth.direction[pixel]
         lamp = tiny_scene()["lamp"] | {"position": [float(c) for c in position]}
-        _, image = truth_and_image(clear_scene(size=(12, 9), brick=brick(), lamp=lamp))
+        _, image = reference_and_image(clear_scene(size=(12, 9), brick=brick(), lamp=lamp))
         value = image.airlight.reshape(-1, 3)[pixel]
         assert not np.any(np.isnan(image.airlight))
         # The lamp's float32 position misses the ray by 1e-8 m or so, and pi / height is what is left of infinity.
@@ -153,9 +153,9 @@ def test_agrees_with_volpath(variant, inside):
         scene["sensor"] = tiny_scene()["sensor"]
         scene["near"] = bounded_medium(huge, 0.0, (0.0, 0.0, 0.0)) | {"interior": {"type": "ref", "id": "fog"}}
         scene = {"type": "scene", "fog": tiny_scene()["fog"]} | scene
-    truth = read_truth(mi.load_dict(scene))
+    truth = read_reference(mi.load_dict(scene))
     assert_volpath_agrees(truth, batches=16, least_precision=0.03)
-    again = read_truth(truth.scene)
+    again = read_reference(truth.scene)
     for before, after in zip(truth.media, again.media, strict=True):
         assert np.array_equal(before.sigma_t, after.sigma_t)
         assert np.array_equal(before.albedo, after.albedo)

@@ -12,7 +12,7 @@ from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.quadrature.fields import field_of
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
@@ -29,7 +29,7 @@ def truth(variant, tmp_path):
     def read(*lights, values=ROUGH, albedo=ALBEDO, shapes=SHAPES, **how):
         path = tmp_path / "grid.xml"
         path.write_text(grid_xml(volume(tmp_path / "smoke.vol", values, **how), *lights, albedo=albedo, shapes=shapes))
-        return read_truth(load_scene(str(path)).scene)
+        return read_reference(load_scene(str(path)).scene)
 
     return read
 
@@ -110,7 +110,7 @@ def test_a_constant_grid_is_homogeneous_fog(truth, tmp_path):
         <transform name="to_world"><scale value="{size}"/><translate value="{corner}"/></transform></shape></scene>"""
     path = tmp_path / "even.xml"
     path.write_text(text.replace("</scene>", cube))
-    expected = quadrature_image(read_truth(load_scene(str(path)).scene), checks=0)
+    expected = quadrature_image(read_reference(load_scene(str(path)).scene), checks=0)
     for layer in ("airlight", "surface"):
         found, known = (getattr(image, layer) for image in (even, expected))
         np.testing.assert_allclose(found, known, rtol=1e-5, atol=1e-6 * known.mean())
@@ -126,7 +126,7 @@ def test_a_shape_that_holds_the_box_bounds_nothing(truth, tmp_path, size):
     path = tmp_path / "grid.xml"
     text = path.read_text().replace('<ref id="smoke" name="medium"/>', "")
     path.write_text(text.replace("</scene>", cube))
-    held = read_truth(load_scene(str(path)).scene)
+    held = read_reference(load_scene(str(path)).scene)
     np.testing.assert_array_equal(held.medium.values, plain.medium.values)
     np.testing.assert_array_equal(held.medium.low, plain.medium.low)
     assert not held.media
@@ -134,7 +134,7 @@ def test_a_shape_that_holds_the_box_bounds_nothing(truth, tmp_path, size):
     small = cube.replace(half, ", ".join(map(str, 0.4 * (HIGH - LOW))))
     path.write_text(text.replace("</scene>", small))
     with pytest.raises(InputError, match="a convex shape that holds its whole box"):
-        read_truth(load_scene(str(path)).scene)
+        read_reference(load_scene(str(path)).scene)
 
 
 @pytest.mark.claim("density-grid-reference", tolerance="1e-12 relative: rounding")

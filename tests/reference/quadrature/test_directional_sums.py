@@ -9,15 +9,15 @@ import pytest
 
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import ray_values
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.suns import BRICK, CHORDS, brick, pearl, plain_airlight, sun, sunny
 
 HG = {"phase": {"type": "hg", "g": 0.6}}
 TABLE = {"phase": {"type": "tabphase", "values": "0.5, 0.2, 0.4, 1.7"}}
 
 
-def truth_and_image(scene, **settings):
-    truth = read_truth(mi.load_dict(scene))
+def reference_and_image(scene, **settings):
+    truth = read_reference(mi.load_dict(scene))
     return truth, quadrature_image(truth, **settings)
 
 
@@ -43,7 +43,7 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     where the light enters a face or passes beside it 1/200000.
     """
     rtol = 2e-5 if case == "light along an axis" else 2e-8
-    truth, image = truth_and_image(CASES[case]())
+    truth, image = reference_and_image(CASES[case]())
     airlight, bound = image.airlight.reshape(-1, 3), image.airlight_bound.reshape(-1, 3)
     lit = np.flatnonzero(airlight.max(axis=1) > 0)
     assert len(lit) >= 3
@@ -64,7 +64,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
 
     origin, direction = np.array([-0.5, -2.0, 0.71875]), np.array([0.0, 1.0, 0.0])
     directions = {"across": [0.0, 0.0, -1.0], "with the ray": [0.0, 1.0, 0.0], "against it": [0.0, -1.0, 0.0]}
-    truth, _ = truth_and_image(sunny(brick=brick(**HG), sun=sun(directions[way])))
+    truth, _ = reference_and_image(sunny(brick=brick(**HG), sun=sun(directions[way])))
     around = replace(truth, origin=origin, direction=direction[None], width=1, height=1)
     values = ray_values(around)
     (medium,) = truth.media
@@ -88,7 +88,7 @@ def test_shadow_of_a_sphere_in_fog(variant):
     """A sphere between sun and box: points by the distance of its centre from their legs, and the plain sum."""
     centre, radius = np.array([-0.71875, 0.25, 1.21875]), 0.1875
     caster = {"type": "sphere", "center": centre.tolist(), "radius": radius}
-    truth, image = truth_and_image(sunny(brick=brick(), caster=caster))
+    truth, image = reference_and_image(sunny(brick=brick(), caster=caster))
     towards = -truth.directional[0].direction
 
     def lit(point):
@@ -112,7 +112,7 @@ def test_shadow_of_a_sphere_in_fog(variant):
 def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
     """The floor below the sphere of fog: E cos albedo/pi, less the chords of the leg and of the view."""
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(6.3), "bsdf": {"type": "diffuse"}}
-    truth, image = truth_and_image(sunny(pearl=pearl(), floor=floor))
+    truth, image = reference_and_image(sunny(pearl=pearl(), floor=floor))
     distance = image.distance.reshape(-1)
     hit = np.isfinite(distance)
     point = truth.origin + distance[hit, None] * truth.direction[hit]

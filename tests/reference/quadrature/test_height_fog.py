@@ -12,7 +12,7 @@ from reference.quadrature.height_fog import fog_of
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import TruthMedium, read_truth
+from reference.scene.read import ReferenceMedium, read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
@@ -37,8 +37,8 @@ def scene(variant, tmp_path):
 
 @pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the height of the scene over H = 1e8 m")
 def test_a_large_scale_height_is_the_image_of_homogeneous_fog(scene):
-    truth = read_truth(scene(LAMP, SPOT, PANEL, size=(8, 6)))
-    plain = TruthMedium(np.full(3, 0.06), truth.medium.albedo, truth.medium.phase, truth.medium.plugin)
+    truth = read_reference(scene(LAMP, SPOT, PANEL, size=(8, 6)))
+    plain = ReferenceMedium(np.full(3, 0.06), truth.medium.albedo, truth.medium.phase, truth.medium.plugin)
     deep = replace(truth.medium, layers=((0.06, 0.0, 1e8),), constant=0.0, floor=-np.inf, cap=np.inf)
     how = {"checks": 0, "plan": PointPlan(error=0.0, first=4, most=4)}
     images = [quadrature_image(replace(truth, medium=medium), **how) for medium in (plain, deep)]
@@ -49,7 +49,7 @@ def test_a_large_scale_height_is_the_image_of_homogeneous_fog(scene):
 
 @pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the trapezoidal rule with 2e5 steps")
 def test_the_sun_by_steps_that_know_the_density_alone(scene):
-    truth = read_truth(scene(SUN))
+    truth = read_reference(scene(SUN))
     image = quadrature_image(truth, checks=0)
     fog, sun = fog_of(truth.medium), truth.directional[0]
     heights = np.linspace(fog.cap, truth.origin[2], 200001)
@@ -70,7 +70,7 @@ def _running_sum(values, x):
 
 
 def test_bounds_are_below_a_millionth_of_the_mean(scene):
-    image = quadrature_image(read_truth(scene(LAMP, SPOT, SUN)))
+    image = quadrature_image(read_reference(scene(LAMP, SPOT, SUN)))
     assert image.airlight_bound.max() < 1e-6 * image.airlight.mean()
     assert image.left == 0
 
@@ -121,12 +121,12 @@ def _flat(fog: HeightFog, sun: float) -> HeightFog:
 @pytest.mark.claim("height-fog-volpath", tolerance="1 % of the image, 95 % intervals of 40 batches")
 def test_volpath_agrees_and_injected_faults_are_found(scene):
     loaded = scene(LAMP, SUN)
-    truth = read_truth(loaded)
+    truth = read_reference(loaded)
     batches = [volpath_batch(truth, seed, 256) for seed in range(BATCHES)]
 
     def outside(changes=()):
         with injected(*changes):
-            found = read_truth(loaded) if changes else truth
+            found = read_reference(loaded) if changes else truth
             image = quadrature_image(found, checks=0, shadow_scale=1 - measure_shadow_epsilon())
         return [abs(bias) + half > 0.01 for bias, half in biases(truth, image, batches)]
 

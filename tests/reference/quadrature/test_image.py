@@ -6,19 +6,19 @@ import pytest
 from scipy.integrate import quad
 
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import spot, tiny_scene
 
 
-def truth_of(**changes):
-    truth = read_truth(mi.load_dict(tiny_scene(**changes)))
+def reference_of(**changes):
+    truth = read_reference(mi.load_dict(tiny_scene(**changes)))
     return truth, quadrature_image(truth)
 
 
 @pytest.mark.claim("radiance", "attenuation-and-falloff", tolerance="1e-9 relative")
 def test_unshadowed_pixels_are_the_adaptive_integral(variant):
     """Against scipy's adaptive quadrature of the distance form, pixel by pixel."""
-    truth, image = truth_of(ball=None, floor=None, size=(4, 3))
+    truth, image = reference_of(ball=None, floor=None, size=(4, 3))
     light, sigma_t = truth.lights[0], truth.medium.sigma_t[0]
     for pixel, direction in enumerate(truth.direction):
 
@@ -40,7 +40,7 @@ def test_shadow_of_a_sphere_against_its_closed_form(variant):
     A point P is in shadow where the segment from the light to P meets the sphere. The airlight is then an integral
     with the indicator of that set, by the midpoint rule with 200 000 steps in theta.
     """
-    truth, image = truth_of(floor=None, size=(12, 9))
+    truth, image = reference_of(floor=None, size=(12, 9))
     light, sigma_t = truth.lights[0], truth.medium.sigma_t[0]
     centre, radius = np.array([0.1, 0.1, 0.7]), 0.41
     to_centre = centre - light.position
@@ -73,7 +73,7 @@ def test_surface_is_mitsubas_direct_integrator(variant, kind):
     """In a vacuum the lit surface is what Mitsuba's `direct` integrator renders at the pixel centres."""
     changes = {} if kind == "point" else {"lamp": spot(beam=20.0)}
     scene = mi.load_dict(tiny_scene(fog=tiny_scene()["fog"] | {"sigma_t": 0.0}, **changes))
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     image = quadrature_image(truth)
     integrator = mi.load_dict({"type": "direct", "bsdf_samples": 0, "emitter_samples": 1})
     sampler = mi.load_dict({"type": "independent"})

@@ -8,13 +8,13 @@ import pytest
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import ray_values
 from reference.scene.camera import film_directions
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.polygons import box_scene
 from tests.helpers.scenes import tiny_scene
 
 
-def truth_of(scene):
-    return read_truth(mi.load_dict(scene))
+def reference_of(scene):
+    return read_reference(mi.load_dict(scene))
 
 
 def brute_force(truth, n, regular=False):
@@ -38,7 +38,7 @@ def brute_force(truth, n, regular=False):
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
     lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
-    truth = truth_of(tiny_scene(ball=None, floor=None, lamp=lamp, size=(4, 3)))
+    truth = reference_of(tiny_scene(ball=None, floor=None, lamp=lamp, size=(4, 3)))
     node, weight = np.polynomial.legendre.leggauss(12)
     node, weight = 0.5 * (node + 1), 0.5 * weight
     row, column = np.divmod(np.arange(12), 4)
@@ -60,7 +60,7 @@ def test_smooth_fog_is_the_integral_over_the_pixel(variant):
 @pytest.mark.claim("pixel-area", tolerance="2e-3 relative beside the bound")
 @pytest.mark.parametrize("scene", [tiny_scene, box_scene], ids=["ball", "boxes"])
 def test_edges_against_brute_force(variant, scene):
-    truth = truth_of(scene(size=(8, 6)))
+    truth = reference_of(scene(size=(8, 6)))
     image = quadrature_image(truth, checks=1, pixel="area")
     airlight, surface, brightest = brute_force(truth, 24)
     # The light is seen: in its pixel regular sub-pixels converge slowly.
@@ -80,7 +80,7 @@ def test_edges_against_brute_force(variant, scene):
 
 def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
     """The ray through the centre meets the light; the mean over the area is what the one over r leaves."""
-    truth = truth_of(tiny_scene(ball=None, floor=None, size=(3, 3)))
+    truth = reference_of(tiny_scene(ball=None, floor=None, size=(3, 3)))
     light = truth.lights[0]
     middle = truth.origin + 2.7 * truth.direction[4]
     truth = replace(truth, lights=(replace(light, position=middle),))

@@ -10,7 +10,7 @@ from analytic.errors import InputError
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.height_fog import LAMP
 from validation.scenes.loading import load_scene
 
@@ -29,7 +29,7 @@ STONE = '<shape type="cube" id="stone"><transform name="to_world"><scale value="
 INSIDE = '<ref name="medium" id="fog"/>'
 
 
-def truth_of(tmp_path, medium, *parts, camera=INSIDE):
+def reference_of(tmp_path, medium, *parts, camera=INSIDE):
     path = tmp_path / "sky.xml"
     path.write_text(
         f"""<scene version="3.0.0">{medium}<float name="albedo" value="{ALBEDO}"/></medium>
@@ -38,7 +38,7 @@ def truth_of(tmp_path, medium, *parts, camera=INSIDE):
         <film type="hdrfilm"><integer name="width" value="6"/><integer name="height" value="4"/></film></sensor>
     {"".join(parts)}</scene>"""
     )
-    return read_truth(load_scene(str(path)).scene)
+    return read_reference(load_scene(str(path)).scene)
 
 
 def close(image, wanted):
@@ -50,7 +50,7 @@ def close(image, wanted):
 
 @pytest.mark.claim("sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most")
 def test_in_height_fog_it_is_the_exponential_integral(variant, tmp_path):
-    truth = truth_of(tmp_path, LAYERED, SKY)
+    truth = reference_of(tmp_path, LAYERED, SKY)
     with pytest.raises(InputError, match=r"bounding box is not valid|light paths of a sun or a sky end within the fog"):
         volpath_batch(truth, 0, 64)  # there are no shapes, whose size says how far a sky is
     x = np.linspace(0, 400, 200_001)
@@ -68,7 +68,7 @@ def test_in_height_fog_it_is_the_exponential_integral(variant, tmp_path):
 
 @pytest.mark.claim("sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most")
 def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
-    truth = truth_of(tmp_path, HOMOGENEOUS, SKY, BALL.format(RADIUS), camera="")
+    truth = reference_of(tmp_path, HOMOGENEOUS, SKY, BALL.format(RADIUS), camera="")
 
     def arriving(r):
         return quad(lambda mu: np.exp(SIGMA_T * (r * mu - np.sqrt(RADIUS**2 - r**2 * (1 - mu**2)))), -1, 1)[0] / 2
@@ -94,8 +94,8 @@ def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
 @pytest.mark.claim("sky-light", tolerance="exactly nothing")
 def test_through_fog_without_bounds_nothing_arrives(variant, tmp_path):
     with pytest.raises(InputError, match="light 'sky' is a sky: nothing of it arrives"):
-        truth_of(tmp_path, HOMOGENEOUS, SKY)
-    dark, lit = (quadrature_image(truth_of(tmp_path, HOMOGENEOUS, LAMP, STONE, *sky)) for sky in ((), (SKY,)))
+        reference_of(tmp_path, HOMOGENEOUS, SKY)
+    dark, lit = (quadrature_image(reference_of(tmp_path, HOMOGENEOUS, LAMP, STONE, *sky)) for sky in ((), (SKY,)))
     np.testing.assert_array_equal(lit.airlight, dark.airlight)
     np.testing.assert_array_equal(lit.surface, dark.surface)
     assert lit.emitted is not None

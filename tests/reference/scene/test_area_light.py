@@ -7,7 +7,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.scene.area_light import triangle_normals
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.area_lights import NULL, lamp, lit_scene, mesh_lamp
 from validation.scenes import meshes
 
@@ -17,7 +17,7 @@ def placed(scale=(0.5, 0.25, 1.0), turn=37.0, move=(0.1, 0.2, 3.0)):
 
 
 def light_of(**shape):
-    return read_truth(lit_scene(lamp=lamp(**shape))).area[0]
+    return read_reference(lit_scene(lamp=lamp(**shape))).area[0]
 
 
 def test_rectangle_has_its_sides_normal_and_power(variant):
@@ -37,7 +37,7 @@ def test_normal_is_that_of_the_side_that_mitsuba_lets_emit(variant, kind, change
     mirror = np.array(change.get("mirror", (1, 1, 1)))
     shape = {"flip_normals": True} if "flip_normals" in change else {}
     scene = lit_scene(lamp=lamp(kind, to_world=placed(scale=(0.5 * mirror).tolist()), **shape))
-    light = read_truth(scene).area[0]
+    light = read_reference(scene).area[0]
     for side in (1, -1):
         ray = mi.Ray3f(mi.Point3f(light.centre + side * light.normal), mi.Vector3f(-side * light.normal))
         hit = scene.ray_intersect(ray)
@@ -56,7 +56,7 @@ def test_disk_and_sphere_have_radius_area_and_power(variant):
 @pytest.mark.parametrize("flipped", [False, True])
 def test_a_mesh_shines_on_the_side_that_mitsuba_lets_emit(variant, flipped):
     scene = lit_scene(lamp=mesh_lamp(meshes.placed(meshes.icosphere(1), (0.1, 0.2, 4.0)), flipped=flipped))
-    light = read_truth(scene).area[0]
+    light = read_reference(scene).area[0]
     assert (light.kind, light.name, light.shadows_itself) == ("mesh", "lamp", flipped)
     normal = triangle_normals(light.triangles)
     middle = light.triangles.mean(axis=1)
@@ -91,4 +91,4 @@ MESSAGES = "is a cylinder, texture, no area, sheared, different scales, holds th
 @pytest.mark.parametrize("message", MESSAGES.split(", "))
 def test_what_has_no_truth_is_refused_by_name(variant, message):
     with pytest.raises(InputError, match=f"light 'lamp'.*{message}.*; wanted"):
-        read_truth(lit_scene(lamp=refused()[message]))
+        read_reference(lit_scene(lamp=refused()[message]))

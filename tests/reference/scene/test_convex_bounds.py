@@ -5,7 +5,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.scene.convex_bounds import Polyhedron, read_bounds
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import bounded_medium, clear_scene
 from tests.helpers.shapes import bounds_of, box, sphere
 
@@ -84,4 +84,4 @@ AMBIENT = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
 )
 def test_refused_scenes(variant, changes, message):
     with pytest.raises(InputError, match=message):
-        read_truth(mi.load_dict(clear_scene(size=(4, 3), **changes())))
+        read_reference(mi.load_dict(clear_scene(size=(4, 3), **changes())))

@@ -7,7 +7,7 @@ from analytic.errors import InputError
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
 from reference.scene.camera import film_positions, pixel_centres
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import spot, tiny_scene
 
 
@@ -15,7 +15,7 @@ def test_both_sides_read_the_same_scene(variant):
     """The truth and the methods under test read a scene by routes of their own; the numbers must be the same."""
     fog = tiny_scene()["fog"] | {"scale": 1.7, "phase": {"type": "hg", "g": -0.31}}
     scene = mi.load_dict(tiny_scene(fog=fog, spot=spot(cutoff=31.0, beam=17.0)))
-    truth, other = read_truth(scene), read_scene(scene, "double")
+    truth, other = read_reference(scene), read_scene(scene, "double")
     assert np.array(other.camera.origin).ravel() == pytest.approx(truth.origin)
     direction = np.array(ray_directions(other.camera, mi.UInt32(np.arange(truth.width * truth.height)))[0]).T
     assert np.max(np.abs(direction - truth.direction)) < 1e-14
@@ -39,7 +39,7 @@ def test_rays_are_those_of_mitsuba(variant, principal):
     for axis, offset in zip("xy", principal):
         parameters[f"principal_point_offset_{axis}"] = offset
     parameters.update()
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     position = pixel_centres(size)
     film = mi.Point2f(*(position / size).T)
     ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, film, mi.Point2f(0.5))
@@ -59,4 +59,4 @@ def test_rays_are_those_of_mitsuba(variant, principal):
 )
 def test_refusals(variant, changes, message):
     with pytest.raises(InputError, match=message):
-        read_truth(mi.load_dict(tiny_scene(**changes)))
+        read_reference(mi.load_dict(tiny_scene(**changes)))

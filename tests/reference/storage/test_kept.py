@@ -35,7 +35,7 @@ from reference.storage.kept import (
 )
 from reports.machine.driver_check import driver_error
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.kernels.rays import _truth
+from validation.kernels.rays import _reference
 from validation.kernels.stability import stability
 from validation.metrics.flip import flip_hdr
 from validation.study.growth import study_scaling
@@ -83,12 +83,12 @@ def test_times_are_those_of_computing_and_never_of_loading():
     """What is made from kept results took as long as they once did."""
     store("truth-a", {"a": 1}, Spent(100.0, 150.0))
 
-    def from_the_truth():
+    def from_the_reference():
         load("truth-a")
         add_spent(Spent(1000.0, 0.0))  # in another process
         return {"b": 2}
 
-    made = kept("method-a", from_the_truth)
+    made = kept("method-a", from_the_reference)
     assert made.spent.seconds == pytest.approx(1100.0, abs=5.0)
     assert made.spent.processor == pytest.approx(150.0, abs=5.0)
     spent = stopwatch()
@@ -197,7 +197,7 @@ def functions():
         "single-scatter": (single_scatter_batch, "reference.monte_carlo.single_scatter.distance_sampling"),
         "volpath": (volpath_batch, "reference.scene.read"),
         "cloud-paths": (cloud_paths_batch, "reference.monte_carlo.cloud_paths.walk"),
-        "kernel-rays": (_truth, "analytic.panels"),
+        "kernel-rays": (_reference, "analytic.panels"),
         "sweep-reference": (sampled_reference, quadrature),
         "row": (run, "realtime.methods.ray_march"),
         "scene-checks": (check_reference, "validation.statistics.comparison"),

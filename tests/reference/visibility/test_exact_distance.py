@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.scene.shapes import read_shapes
 from reference.visibility.exact_distance import exact_distance
 from tests.helpers.scenes import tiny_scene
 
 
 def test_distance_to_a_plane_is_exact(variant):
-    truth = read_truth(mi.load_dict(tiny_scene(ball=None)))
+    truth = read_reference(mi.load_dict(tiny_scene(ball=None)))
     hits = surface_hits(truth)
     distance = exact_distance(truth, hits.interaction, hits.distance)
     met = np.isfinite(hits.distance)
@@ -26,7 +26,7 @@ def test_distance_to_a_plane_is_exact(variant):
 def test_distance_to_a_sphere_is_exact(variant, inside):
     """The points lie on the sphere in float64, and they are those that were cast."""
     sphere = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
-    truth = read_truth(mi.load_dict(tiny_scene(ball=sphere, floor=None)))
+    truth = read_reference(mi.load_dict(tiny_scene(ball=sphere, floor=None)))
     hits = surface_hits(truth)
     distance = exact_distance(truth, hits.interaction, hits.distance)
     met = np.isfinite(hits.distance)

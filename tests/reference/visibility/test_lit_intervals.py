@@ -11,7 +11,7 @@ import reference.quadrature.light_airlight as light_airlight
 import reference.quadrature.ray_values as quadrature
 from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.scene.shapes import Disks, Shapes
 from reference.visibility.candidates import Ball, near_shapes
 from reference.visibility.certificate import EXACT_EDGE, certified, segments_blocked
@@ -150,7 +150,7 @@ def test_a_slit_of_a_billionth_is_found(variant):
 
 
 def setup(scene):
-    truth = read_truth(mi.load_dict(scene))
+    truth = read_reference(mi.load_dict(scene))
     return truth, *rays_of(truth)
 
 
@@ -211,7 +211,7 @@ def test_surfaces_are_reached_as_rays_are(variant):
 @pytest.mark.claim("bound-in-every-pixel", tolerance="1e-5 relative")
 def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     """The figure to reach, at a size for tests: every bound below 1e-5 of its pixel, and nothing contradicted."""
-    image = quadrature_image(read_truth(load_scene("colonnade", size=(32, 24)).scene))
+    image = quadrature_image(read_reference(load_scene("colonnade", size=(32, 24)).scene))
     reached = image.airlight_bound < 1e-5 * image.airlight
     assert np.mean(reached[image.airlight > 0]) > 0.999
     assert (image.disagreements, image.left) == (0, 0)

@@ -4,7 +4,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.scene.read import TruthLight, read_truth
+from reference.scene.read import ReferenceLight, read_reference
 from reference.visibility.planes import cone_interval, falloff, rays_at
 from tests.helpers.scenes import spot, tiny_scene
 
@@ -15,7 +15,7 @@ def test_interval_against_sampling(degrees):
     rng = np.random.default_rng(13)
     axis = np.array([0.3, -0.8, 0.5]) / np.linalg.norm([0.3, -0.8, 0.5])
     angle = np.deg2rad(degrees)
-    light = TruthLight(np.array([0.2, 0.5, -0.4]), np.ones(3), axis, angle, angle)
+    light = ReferenceLight(np.array([0.2, 0.5, -0.4]), np.ones(3), axis, angle, angle)
     origin = np.array([1.1, -0.7, 0.9])
     direction = rng.normal(size=(500, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -33,7 +33,7 @@ def test_interval_against_sampling(degrees):
 @pytest.mark.claim("spot-falloff", tolerance="2e-5: acos of a float32 cosine")
 def test_profile_is_that_of_mitsuba(variant):
     scene = mi.load_dict(tiny_scene(lamp=spot(cutoff=37.0, beam=14.0)))
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     light = truth.lights[0]
     rays = rays_at(truth.origin, truth.direction, light.position)
     normal = rays.normal

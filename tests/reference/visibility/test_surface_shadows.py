@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.scene.shapes import read_shapes
 from reference.visibility.certificate import reached_by_shadow_rays, segments_blocked
 from tests.helpers.scenes import tiny_scene
@@ -47,14 +47,14 @@ def test_edges_of_shadows_move(variant):
 def test_segments_are_blocked_as_rays_are(variant):
     """Against Mitsuba's rays, among triangles and spheres of all sizes; float32 errs on edges, one in a million."""
     scene = mi.load_dict(tiny_scene())
-    shapes = read_shapes(read_truth(scene).occluders)
+    shapes = read_shapes(read_reference(scene).occluders)
     random = np.random.default_rng(5)
     start, end = random.uniform(-1.3, 1.3, (2, 4000, 3)) + np.array([0, 0, 0.6])
     way = end - start
     length = np.linalg.norm(way, axis=1)
     ray = mi.Ray3f(mi.Point3f(start.T), mi.Vector3f((way / length[:, None]).T))
     ray.maxt = mi.Float(length)
-    cast = np.array(read_truth(scene).occluders.ray_test(ray), dtype=bool)
+    cast = np.array(read_reference(scene).occluders.ray_test(ray), dtype=bool)
     assert 0.1 < cast.mean() < 0.9
     assert np.sum(segments_blocked(start, end, shapes) != cast) <= 2
 
@@ -75,6 +75,6 @@ def test_the_truth_of_a_renderer_with_an_epsilon_has_its_edges(variant):
         light={"type": "point", "position": LIGHT.tolist(), "intensity": 3.0},
     )
     scene["sensor"] = scene["sensor"] | {"to_world": camera}
-    truth = read_truth(mi.load_dict(scene))
+    truth = read_reference(mi.load_dict(scene))
     assert quadrature_image(truth).surface.min() > 0
     assert np.all(quadrature_image(truth, shadow_scale=0.999).surface == 0)

@@ -10,7 +10,7 @@ import pytest
 
 import airlight
 from tests.helpers.api import TINY, brighter, third
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.registry import SCENES
 
 
@@ -84,7 +84,7 @@ def test_the_truth_with_its_bound(variant, own_cache):
     told = []
     scene = airlight.load_scene("sphere-spot", TINY)
     truth = airlight.reference(scene, progress=lambda share, what: told.append((share, what)))
-    np.testing.assert_array_equal(truth.airlight, truth_image(scene.scene).airlight)
+    np.testing.assert_array_equal(truth.airlight, reference_image(scene.scene).airlight)
     assert truth.bound.shape == truth.airlight.shape == (12, 16, 3)
     assert truth.airlight.dtype == np.float64
     assert truth.standard_error is truth.surface_standard_error is None
@@ -114,13 +114,13 @@ def test_a_truth_by_samples_with_its_standard_error(variant):
 def test_images_files_and_arrays_compare_alike(variant, tmp_path):
     truth = airlight.reference("sphere-spot", size=TINY)
     frame = airlight.render("sphere-spot", "ray-march", size=TINY, steps=16)
-    truth_file, frame_file = truth.save(tmp_path / "truth.exr"), frame.save(tmp_path / "frame.exr")
+    reference_file, frame_file = truth.save(tmp_path / "truth.exr"), frame.save(tmp_path / "frame.exr")
     direct = airlight.compare(truth, frame)
     assert direct.metrics == airlight.error_metrics(truth.airlight, frame.airlight)
     assert airlight.compare(truth.airlight, frame.airlight).metrics == direct.metrics
     assert airlight.compare(truth, airlight.read_exr(frame_file)).metrics == direct.metrics
     # A file keeps float32.
-    files = airlight.compare(truth_file, frame_file)
+    files = airlight.compare(reference_file, frame_file)
     assert files.metrics.relative_rmse == pytest.approx(direct.metrics.relative_rmse, rel=1e-5)
     assert files.names == ("truth.exr", "frame.exr")
     total = airlight.compare(truth, frame, "total")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: a report whose truths and checks a cluster computed says what it says without one."""
+"""Claim: a report whose references and checks a cluster computed says what it says without one."""
 
 import json
 

@@ -9,7 +9,7 @@ import pytest
 import airlight
 from reference.storage.exr import Image, read_exr, write_exr
 from reports.commands.main import run
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 
 SHAPE = (16, 20, 3)
@@ -60,7 +60,7 @@ def test_everything_at_once(files, capsys):
 def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
     """The truth is found at the size of the file; upside down it is suspected, and the margin decides."""
     path, difference = tmp_path / "open-fog.exr", tmp_path / "difference.exr"
-    airlight = truth_image(load_scene("open-fog", (32, 24)).scene).airlight
+    airlight = reference_image(load_scene("open-fog", (32, 24)).scene).airlight
     write_exr(path, Image({"airlight": airlight}))
     values = printed(capsys, "open-fog", str(path), "--margin", "1e-6", "-o", str(difference))
     assert (values["scene"], values["size"], values["hints"]) == ("open-fog", [32, 24], [])
@@ -101,7 +101,7 @@ def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, cap
 
 def test_the_command_and_python_find_the_fog_that_made_an_image(variant, tmp_path, capsys):
     path = tmp_path / "fog.exr"
-    write_exr(path, Image({"airlight": truth_image(load_scene("open-fog", (32, 24)).scene).airlight}))
+    write_exr(path, Image({"airlight": reference_image(load_scene("open-fog", (32, 24)).scene).airlight}))
     arguments = ["open-fog", str(path), "--fit", "sigma_t=0.9,intensity"]
     data = printed(capsys, *arguments)
     assert {"parameters", "residual", "explained", "confounded"} <= set(data)

@@ -183,13 +183,13 @@ def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
 def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys):
     import json
 
-    from validation.estimates.quadrature import truth_image
+    from validation.estimates.quadrature import reference_image
     from validation.scenes.loading import load_scene
 
-    truth = truth_image(load_scene("open-fog", (32, 24)).scene)
+    truth = reference_image(load_scene("open-fog", (32, 24)).scene)
     for name, factor in (("a", 1.0), ("b", 0.9)):
         write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * truth.airlight}))
-    area = truth_image(load_scene("open-fog", (32, 24)).scene, pixel="area")
+    area = reference_image(load_scene("open-fog", (32, 24)).scene, pixel="area")
     write_exr(images / "open-fog.means.exr", Image({"total": area.airlight}))
     options = ["open-fog", "--method", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]
     assert run(["report", "--quick", "--images", str(images), *options]) == 0

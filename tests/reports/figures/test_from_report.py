@@ -26,7 +26,7 @@ from tests.helpers.reports import (
     settings,
     timing,
 )
-from tests.helpers.reports import truth as truth_of
+from tests.helpers.reports import truth as reference_of
 
 _SIZE = (24, 32)  # height, width
 _WRONG = {"sound": 1e-6, "march (steps=8)": 0.02}
@@ -53,7 +53,7 @@ def report(tmp_path_factory):
         methods.append(method(label, error, files={"exr": f"{label[:5]}.exr"}))
     methods += [engine("engine", 0.1) | {"layer": "airlight"}, refused("refused_one", "no such media")]
     files = {"exr": "reference.exr", "picture": "reference.png", "airlight": "reference-airlight.png"}
-    studied = scene("a_scene", methods, size=[32, 24], reference=truth_of(relative_bound=4e-11), files=files)
+    studied = scene("a_scene", methods, size=[32, 24], reference=reference_of(relative_bound=4e-11), files=files)
     data = report_of(
         [studied],
         created="2031-01-02 03:04:05 +0000",

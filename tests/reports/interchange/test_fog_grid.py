@@ -7,7 +7,7 @@ import pytest
 
 import airlight
 from reference.quadrature.height_fog import fog_of
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reports.interchange.fog_grid import fog_grid, write_fog_grid
 from tests.helpers.height_fog import LAMP, fog_xml
 from validation.scenes.loading import load_scene
@@ -17,7 +17,7 @@ from validation.scenes.loading import load_scene
 def medium(variant, tmp_path):
     path = tmp_path / "fog.xml"
     path.write_text(fog_xml(LAMP))
-    return read_truth(load_scene(str(path)).scene).medium
+    return read_reference(load_scene(str(path)).scene).medium
 
 
 @pytest.mark.claim("height-fog-grid", tolerance="1e-12 relative between nodes, u^2/8 of the whole")

@@ -29,10 +29,10 @@ def test_plain_makes_what_json_can_hold():
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
 def test_truth_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
-    from reference.quadrature.ray_values import TruthImage
+    from reference.quadrature.ray_values import ReferenceImage
 
     black = np.zeros_like(airlight)
-    data = reference_data(TruthImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
+    data = reference_data(ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
     json.dumps(data, allow_nan=False)
     assert data["relative_bound"] is None
     assert data["missed"] is None

@@ -11,7 +11,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.exr import Image
 from tests.helpers.planted_faults import PLANTED
 from validation.engine.diagnose import diagnose_image
@@ -37,7 +37,7 @@ def total(truth, **how):
 
 @pytest.fixture(scope="module")
 def truth(variant):
-    return read_truth(load_scene("sphere-spot", SIZE).scene)
+    return read_reference(load_scene("sphere-spot", SIZE).scene)
 
 
 # A diagnosis takes some seconds: the fast tests have one fault of each kind.
@@ -88,7 +88,7 @@ def test_a_light_with_a_radius_is_named(variant, tmp_path):
         up="0, 0, 1"/></transform><ref name="medium" id="fog"/></sensor>
         <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape></scene>"""
     )
-    own = read_truth(load_scene(str(path), SIZE).scene)
+    own = read_reference(load_scene(str(path), SIZE).scene)
     model = FogModel(scattering_paths(view_of(own), radius=0.25, samples=64))
     image = model.layers(scene_fog(own)).sum(axis=0).reshape(SIZE[1], SIZE[0], 3)
     assert diagnosed(image, str(path)).first == "light-radius"
@@ -146,7 +146,7 @@ def scenes(variant, tmp_path_factory):
         path = tmp_path_factory.mktemp("engine") / "scene.xml"
         path.write_text(numpy_faults.scene_xml(engine))
         loaded = load_scene(str(path), LARGER)
-        return loaded, SceneLight(read_truth(loaded.scene))
+        return loaded, SceneLight(read_reference(loaded.scene))
 
     return {engine: scene(engine) for engine in (numpy_faults.RIGHT, numpy_faults.LAYERED)}
 

@@ -20,7 +20,7 @@ RANDOM = np.random.default_rng(5)
 AIRLIGHT, SURFACE = RANDOM.uniform(0.5, 2, SHAPE), RANDOM.uniform(0, 3, SHAPE)
 
 
-def truth_of(pixel):
+def reference_of(pixel):
     """The means over pixels are a tenth brighter here, where a pixel is bright."""
     brighter = 1 + 0.1 * (pixel == "area") * (AIRLIGHT > 1)
     layers = {"airlight": brighter * AIRLIGHT, "surface": brighter * SURFACE, "emitted": None}
@@ -59,7 +59,9 @@ def test_images_of_a_scene_have_one_size(tmp_path):
 
 
 def measured(path, *, surfaces=True):
-    return measure_image(EngineImage("hall", "godot", path), load_scene("hall", (6, 4)), truth_of, surfaces=surfaces)
+    return measure_image(
+        EngineImage("hall", "godot", path), load_scene("hall", (6, 4)), reference_of, surfaces=surfaces
+    )
 
 
 def test_a_layer_of_airlight_is_judged_as_such(variant, tmp_path):
@@ -94,7 +96,7 @@ def test_colours_in_integers_are_refused_by_name(tmp_path):
 @pytest.mark.claim("engine-pixels")
 def test_the_truth_that_fits_is_taken(variant, tmp_path):
     for pixel in ("centre", "area"):
-        truth = truth_of(pixel)
+        truth = reference_of(pixel)
         path = written(tmp_path, f"{pixel}.exr", total=0.999 * (truth.airlight + truth.surface))
         found = measured(path)
         assert (found.judged.pixel, "means over the areas" in found.notes) == (pixel, pixel == "area")

@@ -13,10 +13,10 @@ from validation.comparison.images import compare_images
 from validation.engine.error_place import error_place
 from validation.engine.hints import find_hints
 from validation.engine.images import EngineImage, measure_image
-from validation.engine.judge import compare_scene, judge, truths
+from validation.engine.judge import compare_scene, judge, references
 from validation.engine.judged_layer import expected_layer, judged_layer
 from validation.engine.seen import scene_of_size, seen_image
-from validation.estimates.quadrature import reference_error, reference_layer, truth_image
+from validation.estimates.quadrature import reference_error, reference_image, reference_layer
 from validation.scenes.loading import load_scene
 
 SCENE = """<scene version="3.0.0">
@@ -45,7 +45,7 @@ def scene(tmp_path):
 
 @pytest.fixture
 def truth(scene, variant):
-    return truth_image(load_scene(scene, (16, 12)).scene)
+    return reference_image(load_scene(scene, (16, 12)).scene)
 
 
 @pytest.fixture
@@ -112,7 +112,7 @@ def area_lit(variant, tmp_path_factory):
     path = tmp_path_factory.mktemp("area") / "area.xml"
     path.write_text(AREA_LIT)
     loaded = load_scene(str(path), (16, 12))
-    return str(path), loaded, truth_image(loaded.scene)
+    return str(path), loaded, reference_image(loaded.scene)
 
 
 def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_files(area_lit, write):
@@ -122,7 +122,7 @@ def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_
     file = write(total=reference_layer(truth, "total"))
     assert compare_scene(path, file, pixel="centre").verdict.right
     assert measure_image(
-        EngineImage("area", "engine", file), loaded, truths(loaded), surfaces=True
+        EngineImage("area", "engine", file), loaded, references(loaded), surfaces=True
     ).judged.verdict.right
     dark = compare_scene(path, write(total=truth.airlight + truth.surface), pixel="centre")
     assert not dark.verdict.right
@@ -206,7 +206,7 @@ def traced(request, variant, tmp_path_factory):
     Every value has Gaussian noise of 2 %, those beside the lamp of 30 %, as LuxCore's had at 512 paths a pixel, and the
     pixel of the lamp is twice as bright as it should be: its variance is infinite.
     """
-    truth = truth_image(load_scene(request.param, SIZE).scene, pixel="area")
+    truth = reference_image(load_scene(request.param, SIZE).scene, pixel="area")
     total = reference_layer(truth, "total")
     beside = truth.light_angle < 3 * np.deg2rad(58 / SIZE[0])
     noise = np.where(beside, 0.3, 0.02)[:, :, None] * np.random.default_rng(7).standard_normal((*total.shape[:2], 1))
@@ -235,7 +235,7 @@ def test_the_right_image_of_a_path_tracer_is_called_right_without_options(traced
 @pytest.mark.claim("engine-verdict", "engine-pixels")
 def test_the_right_image_of_pixel_centres_is_called_right_too(traced):
     scene, *_ = traced
-    centre = reference_layer(truth_image(load_scene(scene, SIZE).scene), "total")
+    centre = reference_layer(reference_image(load_scene(scene, SIZE).scene), "total")
     noise = 1 + 0.02 * np.random.default_rng(8).standard_normal((*centre.shape[:2], 1))
     judged = compared(traced, noise * centre)
     assert (judged.pixel, judged.verdict.right) == ("centre", True)

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import mitsuba as mi
 import pytest
 
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 from validation.estimates import agreement as agreement_module
 from validation.estimates.agreement import MASK_PIXELS, agreement, layer_masks, pixel_angle
 from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 
 pytestmark = pytest.mark.statistical
 
@@ -22,13 +22,13 @@ def scene(variant):
     return mi.load_dict(tiny_scene(size=(24, 18)))
 
 
-def false_truth(monkeypatch, change):
+def false_reference(monkeypatch, change):
     """Let the comparison take a changed image for the truth."""
     import validation.estimates.agreement
 
-    true = validation.estimates.agreement.truth_image
+    true = validation.estimates.agreement.reference_image
     monkeypatch.setattr(
-        validation.estimates.agreement, "truth_image", lambda *args, **kwargs: change(true(*args, **kwargs))
+        validation.estimates.agreement, "reference_image", lambda *args, **kwargs: change(true(*args, **kwargs))
     )
 
 
@@ -55,7 +55,7 @@ def test_volpath_agrees_with_the_truth(scene):
 @pytest.mark.parametrize("factor", [1.05, 0.95])
 def test_truth_that_is_five_per_cent_off_does_not_agree(scene, monkeypatch, layer, factor):
     """In one layer alone; the other one still agrees."""
-    false_truth(monkeypatch, lambda image: replace(image, **{layer: factor * getattr(image, layer)}))
+    false_reference(monkeypatch, lambda image: replace(image, **{layer: factor * getattr(image, layer)}))
     verdicts = agreement(scene, **BUDGET)
     assert verdicts[layer].statistics.equivalent is False
     assert verdicts[layer].statistics.relative_bias == pytest.approx(1 / factor - 1, abs=0.015)
@@ -71,7 +71,7 @@ def test_truth_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatch):
         airlight[:6, :6] *= 1.4
         return replace(image, airlight=airlight)
 
-    false_truth(monkeypatch, corner)
+    false_reference(monkeypatch, corner)
     statistics = agreement(scene, **BUDGET)["airlight"].statistics
     assert statistics.rejected + statistics.rejected_blocks > 0
 
@@ -83,8 +83,8 @@ def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
     The slope comes from a share of 1 %, whose square term is half of 0.01 sigma_t <r>, below 1 % of it. One bias over
     the other is the ratio of the two references: no sample counts.
     """
-    plain, shorter = truth_image(scene), truth_image(scene, shadow_scale=0.99)
-    masks = layer_masks(read_truth(scene), plain)
+    plain, shorter = reference_image(scene), reference_image(scene, shadow_scale=0.99)
+    masks = layer_masks(read_reference(scene), plain)
     for layer, verdict in agreement(scene, **BUDGET).items():
         sums = [getattr(image, layer)[masks[layer]].sum() for image in (plain, shorter)]
         slope = (sums[1] / sums[0] - 1) / 0.01
@@ -95,7 +95,7 @@ def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
 
 @pytest.mark.claim("pixels-beside-a-light")
 def test_pixels_near_a_light_are_left_out(scene):
-    near = truth_image(scene).light_angle <= MASK_PIXELS * pixel_angle(read_truth(scene))
+    near = reference_image(scene).light_angle <= MASK_PIXELS * pixel_angle(read_reference(scene))
     verdicts = agreement(scene, **BUDGET)
     assert verdicts["airlight"].masked == near.sum()
     assert 4 <= near.sum() <= 16  # a disc of two pixels' radius

@@ -15,7 +15,7 @@ import validation.estimates.monte_carlo
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LARGEST_SEED, Batches, single_batch
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.cache import cache_folder
 from reference.storage.exr import Image
 from reference.storage.kept import fresh_results
@@ -31,7 +31,7 @@ from validation.estimates.images import (
 )
 from validation.estimates.merge import merged_references
 from validation.estimates.monte_carlo import BLOCK, monte_carlo_batches
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import LoadedScene, load_scene
 
 
@@ -83,7 +83,7 @@ def test_the_cache_never_changes_what_is_returned(scene, traced, monkeypatch, tm
 def test_moments_are_those_of_all_batches(scene, traced):
     pooled = volpath(scene, batches=21, first_seed=5).batches
     means = np.stack(
-        [validation.estimates.monte_carlo.volpath_batch(read_truth(scene), seed, 4).mean for seed in range(5, 26)]
+        [validation.estimates.monte_carlo.volpath_batch(read_reference(scene), seed, 4).mean for seed in range(5, 26)]
     )
     # Sums of 21 numbers in another order: a few roundings.
     np.testing.assert_allclose(pooled.mean, means.mean(axis=0), rtol=1e-13)
@@ -296,8 +296,8 @@ def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
     behind = {"type": "point", "position": [0.3, -6.0, 1.1]}
     hidden = {"type": "point", "position": [0.1, 0.3, 0.65]}
     scene = mi.load_dict(tiny_scene(size=(40, 30), behind=behind, hidden=hidden))
-    truth = read_truth(scene)
-    expected = truth_image(scene, checks=2).light_angle <= MASK_PIXELS * pixel_angle(truth)
+    truth = read_reference(scene)
+    expected = reference_image(scene, checks=2).light_angle <= MASK_PIXELS * pixel_angle(truth)
     assert 0 < expected.sum() < 40
     np.testing.assert_array_equal(near_light(truth, surface_hits(truth).distance), expected.ravel())
 

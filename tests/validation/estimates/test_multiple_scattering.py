@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 from validation.estimates.multiple_scattering import left_out, multiple_scattering_fraction
 
@@ -17,7 +17,7 @@ def scene(albedo=0.9, sigma_t=0.31, **changes):
 
 
 def layers(albedo, depth):
-    return volpath_batch(read_truth(scene(albedo)), 3, 16, max_depth=depth).mean
+    return volpath_batch(read_reference(scene(albedo)), 3, 16, max_depth=depth).mean
 
 
 @pytest.mark.claim("left-out-share")

@@ -11,16 +11,16 @@ import validation.estimates.quadrature as module
 from analytic.errors import InputError
 from reference.quadrature import area_lights
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import TruthImage
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import PointPlan
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.helpers.area_lights import NULL, fog, lamp, lit_scene
 from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.agreement import layer_masks, truth_estimate
-from validation.estimates.images import layered_truth
+from validation.estimates.agreement import layer_masks, reference_estimate
+from validation.estimates.images import layered_reference
 from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.quadrature import reference_error, reference_layer, truth_image, truth_of_pixels
+from validation.estimates.quadrature import reference_error, reference_image, reference_layer, reference_of_pixels
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.statistics.comparison import Estimate, compare_statistics
 
@@ -53,7 +53,7 @@ def assert_same(actual, expected):
 
 
 def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
-    first, second = truth_image(scene, checks=4), truth_image(scene, checks=4)
+    first, second = reference_image(scene, checks=4), reference_image(scene, checks=4)
     assert len(computed) == 1
     assert_same(first, second)
     assert first.airlight.shape == (6, 8, 3)
@@ -63,15 +63,15 @@ def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
 def test_other_phase_function_has_another_truth(scene, own_cache, computed):
     """The phase function has no parameters that a key could see; an isotropic truth would pass for it."""
     fog = tiny_scene()["fog"] | {"phase": {"type": "rayleigh"}}
-    plain = truth_image(scene, checks=4)
-    rayleigh = truth_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), checks=4)
+    plain = reference_image(scene, checks=4)
+    rayleigh = reference_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), checks=4)
     assert len(computed) == 2
     assert np.abs(rayleigh.airlight / plain.airlight - 1).max() > 0.05
 
 
 def test_the_truth_of_some_pixels_is_that_of_the_image(scene, own_cache):
     pixels = np.array([3, 4, 40, 7])
-    some, whole = truth_of_pixels(scene, pixels), truth_image(scene)
+    some, whole = reference_of_pixels(scene, pixels), reference_image(scene)
     for layer in ("airlight", "surface", "distance", "light_angle"):
         values = getattr(whole, layer)
         np.testing.assert_array_equal(getattr(some, layer)[0], values.reshape(-1, *values.shape[2:])[pixels])
@@ -95,19 +95,19 @@ def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monk
 
     monkeypatch.setattr(area_lights, "_scattered", some)
     with pytest.raises(KeyboardInterrupt):
-        truth_image(scene)
+        reference_image(scene)
     counted = []
     monkeypatch.setattr(area_lights, "_scattered", lambda *arguments: (counted.append(1), compute(*arguments))[1])
-    again = truth_image(scene)
+    again = reference_image(scene)
     went_on = len(counted)
     assert not list(own_cache.glob("**/airlight-*"))
-    assert_same(truth_image(scene), again)
+    assert_same(reference_image(scene), again)
     for path in own_cache.glob("**/quadrature-*.npz"):
         path.unlink()
     counted.clear()
-    assert_same(truth_image(scene), again)
+    assert_same(reference_image(scene), again)
     assert len(counted) == went_on + 5
-    image = layered_truth("lamp", again)
+    image = layered_reference("lamp", again)
     assert {"emitted", "airlight_se", "surface_se", "airlight_bound"} <= set(image.layers)
     assert image.attributes["airlight:batches"] == 8
 
@@ -116,10 +116,10 @@ def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monk
 def test_volpath_should_find_a_little_more_light(variant):
     """exp(-sigma_t r (1 - epsilon)) over exp(-sigma_t r): at most 1 + 2 epsilon where sigma_t r is below 2."""
     scene = load_scene("open-fog", (16, 12)).scene
-    image = truth_image(scene)
-    mask = layer_masks(read_truth(scene), image)["airlight"]
+    image = reference_image(scene)
+    mask = layer_masks(read_reference(scene), image)["airlight"]
     plain = image.airlight[mask]
-    shortened = truth_image(scene, shadow_scale=1 - measure_shadow_epsilon()).airlight[mask]
+    shortened = reference_image(scene, shadow_scale=1 - measure_shadow_epsilon()).airlight[mask]
     lit = plain > 0
     assert lit.all(axis=1).any()
     more = shortened[lit] / plain[lit] - 1
@@ -131,7 +131,7 @@ def test_the_total_of_a_seen_light_is_what_mitsuba_shows(variant):
     """Without albedo a pixel inside the light is Le exp(-sigma_t x): volpath's paths see the light or are absorbed."""
     place = mi.ScalarTransform4f().translate([0.0, 0.0, 2.5]).rotate([1, 0, 0], 180).scale([5.1, 4.7, 1.0])
     scene = lit_scene(size=(3, 2), medium=fog(0.21, 0.0), lamp=lamp(to_world=place, bsdf=NULL))
-    seen = read_truth(scene)
+    seen = read_reference(scene)
     truth = quadrature_image(seen, plan=PointPlan(error=0.0, first=2, most=2))
     paths, shown = 1 << 14, {}
     ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(0.0), mi.Vector3f(np.repeat(seen.direction, paths, axis=0).T)))
@@ -152,8 +152,8 @@ def test_the_total_of_a_seen_light_is_what_mitsuba_shows(variant):
 def test_variances_of_the_total_add_up():
     layer = np.ones((1, 1, 3))
     none = np.full((1, 1), np.inf)
-    plain = TruthImage(layer, 0 * layer, 2 * layer, none, none, 0, 0.0)
-    lit = TruthImage(
+    plain = ReferenceImage(layer, 0 * layer, 2 * layer, none, none, 0, 0.0)
+    lit = ReferenceImage(
         layer, 0 * layer, 2 * layer, none, none, 0, 0.0, emitted=5 * layer, airlight_se=3 * layer, surface_se=4 * layer
     )
     assert reference_error(plain, "total") is None
@@ -181,9 +181,9 @@ def test_errors_of_points_that_all_pixels_share_add_up(common):
         values = 0.5 + replicates.mean(axis=-1)  # and 0.5 from a point light
         more = {"emitted": errors[0], "airlight_se": errors[0], "surface_se": errors[1]}
         means = replicates.mean(axis=(1, 2)).swapaxes(1, 2)
-        truth = TruthImage(values[0], 0 * values[0], values[1], none, none, 0, 0.0, **more, replicate_means=means)
+        truth = ReferenceImage(values[0], 0 * values[0], values[1], none, none, 0, 0.0, **more, replicate_means=means)
         sure = Estimate(np.ones((8, 12, 3)), np.full((8, 12, 3), 1e-9), 64)
-        statistics = compare_statistics(truth_estimate(truth, "airlight", sure, mask), sure, mask=mask)
+        statistics = compare_statistics(reference_estimate(truth, "airlight", sure, mask), sure, mask=mask)
         held += statistics.relative_bias_ci_batches[0] <= 0 <= statistics.relative_bias_ci_batches[1]
         apart += statistics.relative_bias_ci[0] <= 0 <= statistics.relative_bias_ci[1]
     assert held / 200 > 0.89
@@ -199,19 +199,19 @@ def scene_with(position, *, size=(9, 9), **changes):
     return mi.load_dict({name: part for name, part in (scene | changes).items() if part is not None})
 
 
-def truths(scene):
+def references(scene):
     """Return what gives the truth by each estimator."""
 
     def sampled(estimator):
         return lambda: monte_carlo_batches(scene, estimator, batches=2, samples=1).batches.mean
 
-    return [lambda: truth_image(scene).airlight, sampled("single-scatter"), sampled("volpath")]
+    return [lambda: reference_image(scene).airlight, sampled("single-scatter"), sampled("volpath")]
 
 
 @pytest.mark.claim("light-on-a-ray-refused")
 @pytest.mark.parametrize("position", [[0.0, -5.0, 1.0], [0.0, 0.0, 1.0], [1e-8, 0.0, 1.0]])
 def test_every_estimator_refuses_a_light_at_the_camera_or_on_a_ray(variant, position):
-    for truth in truths(scene_with(position)):
+    for truth in references(scene_with(position)):
         with pytest.raises(InputError, match=r"light 1 at .* is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"):
             truth()
 
@@ -221,18 +221,18 @@ def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
         place = mi.ScalarTransform4f().look_at([0, 0, 1], target, [0, 0, 1])
         return spot() | {"to_world": place}
 
-    assert np.isfinite(truth_image(scene_with(None, lamp=lamp([9, 0, 1]))).airlight).all()
+    assert np.isfinite(reference_image(scene_with(None, lamp=lamp([9, 0, 1]))).airlight).all()
     for target in ([0, 9, 1], [0.5, -4, 1]):
         with pytest.raises(InputError, match="light 1"):
-            truth_image(scene_with(None, lamp=lamp(target)))
+            reference_image(scene_with(None, lamp=lamp(target)))
 
 
 def test_the_mean_over_pixels_is_finite_where_a_centre_meets_a_light(variant):
-    means = truth_image(scene_with([0.0, 0.0, 1.0], size=(3, 3)), pixel="area").airlight
+    means = reference_image(scene_with([0.0, 0.0, 1.0], size=(3, 3)), pixel="area").airlight
     assert np.isfinite(means).all()
     assert means[1, 1].min() > means[0, 0].max()
     with pytest.raises(InputError, match="m from the camera"):
-        truth_image(scene_with([0.0, -5.0, 1.0], size=(3, 3)), pixel="area")
+        reference_image(scene_with([0.0, -5.0, 1.0], size=(3, 3)), pixel="area")
 
 
 def test_a_truth_that_is_not_finite_is_refused_and_not_kept(variant, own_cache, monkeypatch):
@@ -247,4 +247,4 @@ def test_a_truth_that_is_not_finite_is_refused_and_not_kept(variant, own_cache, 
     monkeypatch.setattr(module, "quadrature_image", broken)
     for _ in range(2):
         with pytest.raises(InputError, match="1 of 12 pixels whose surface is not finite, first in column 2 of row 1"):
-            module.truth_image(scene)
+            module.reference_image(scene)

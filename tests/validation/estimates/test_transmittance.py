@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.density_grid import ROUGH, grid_xml, volume
 from tests.helpers.height_fog import LAMP
 from validation.estimates.transmittance import (
@@ -68,7 +68,7 @@ def test_a_constant_extinction_is_exact_and_tracking_is_unbiased():
 def test_a_naive_march_is_too_bright_as_jensen_says(variant, tmp_path):
     path = tmp_path / "grid.xml"
     path.write_text(grid_xml(volume(tmp_path / "smoke.vol", ROUGH**3), LAMP))
-    errors = transmittance_errors(read_truth(load_scene(str(path)).scene), (2, 4))
+    errors = transmittance_errors(read_reference(load_scene(str(path)).scene), (2, 4))
     for each in errors:
         if each.estimator == "naive":
             assert each.bias == pytest.approx(each.jensen, rel=0.25, abs=4 * each.bias_error)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.exr import Image
 from validation.engine.seen import Seen
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.fit.confounding import confounded_groups
 from validation.fit.fit import fit_image
 from validation.fit.solve import (
@@ -57,7 +57,7 @@ def scene_file(tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, po
 
 
 def image_of(path):
-    truth = truth_image(load_scene(path).scene)
+    truth = reference_image(load_scene(path).scene)
     return Image({"airlight": truth.airlight, "surface": truth.surface, "total": truth.airlight + truth.surface})
 
 
@@ -107,7 +107,7 @@ def test_heights_of_a_layer_are_found_in_an_image_by_other_code(variant, tmp_pat
 @pytest.mark.slow
 def test_each_of_several_lights_has_a_factor(variant, tmp_path):
     scene = scene_file(tmp_path, lights=2)
-    truth = read_truth(load_scene(scene).scene)
+    truth = read_reference(load_scene(scene).scene)
     pixels = SIZE[0] * SIZE[1]
     model = ImageModel.of(Seen(truth, np.ones((pixels, 3)), "airlight", np.ones(pixels, bool)))
     bright = model.radiance(replace(model.fog, intensity=(1.4, 0.3)))
@@ -171,7 +171,7 @@ def test_pixels_that_disagree_are_left_out(variant, tmp_path):
 @pytest.mark.claim("fit-coverage")
 @pytest.mark.parametrize("noise", ["relative", "absolute", "skewed"])
 def test_intervals_cover_the_truth_as_often_as_they_say(variant, tmp_path, noise):
-    truth = read_truth(load_scene(scene_file(tmp_path), (32, 24)).scene)
+    truth = read_reference(load_scene(scene_file(tmp_path), (32, 24)).scene)
     fog, count, trials = scene_fog(truth), 32 * 24, 200
     unknowns = read_unknowns(["sigma_t", "phase.g", "intensity"], truth, fog, {})
     model = ImageModel.of(Seen(truth, np.zeros((count, 3)), "airlight", np.ones(count, bool)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
 from validation.fog_model.places import panel_nodes
 from validation.fog_model.radiance import FogModel, scene_fog
@@ -24,7 +24,7 @@ def relative(values, wanted):
 
 
 def model_and_image(name):
-    truth = read_truth(load_scene(name, SIZE).scene)
+    truth = read_reference(load_scene(name, SIZE).scene)
     return truth, FogModel(scattering_paths(view_of(truth))), quadrature_image(truth)
 
 
@@ -61,7 +61,7 @@ def test_radiance_in_height_fog_is_that_of_the_reference(variant, tmp_path):
 
 
 def test_laws_can_be_changed_one_by_one(variant):
-    truth = read_truth(load_scene("open-fog", SIZE).scene)
+    truth = read_reference(load_scene("open-fog", SIZE).scene)
     model, fog = FogModel(scattering_paths(view_of(truth))), scene_fog(truth)
     nodes = model.paths.lights[0].nodes
     right = model.layers(fog)[0]

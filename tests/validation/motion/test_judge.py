@@ -9,7 +9,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.motion.judge import compare_frames
 from validation.scenes.loading import load_scene
 
@@ -30,7 +30,7 @@ def lights(variant):
     """Return the places of a light, and the references of their frames."""
     places = [[0.83 - 0.15 * n, 0.47, 1.57] for n in range(FRAMES)]
     scenes = [load_scene("open-fog", SIZE, {"light.position": tuple(place)}).scene for place in places]
-    return {"light.position": places}, [truth_image(scene).airlight for scene in scenes]
+    return {"light.position": places}, [reference_image(scene).airlight for scene in scenes]
 
 
 def test_the_fog_of_the_last_frame_is_late(lights, tmp_path):
@@ -56,7 +56,7 @@ def test_exposure_is_taken_away(lights, tmp_path):
 def test_jittered_frames_are_those_between_the_pixels(variant, tmp_path):
     """Every second pixel of an image of twice the size passes a quarter of a pixel beside the centres."""
     size, quarters = (16, 12), [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)]
-    fine = truth_image(load_scene("sphere-spot", (32, 24)).scene).airlight
+    fine = reference_image(load_scene("sphere-spot", (32, 24)).scene).airlight
     frames = [fine[int(down > 0) :: 2, int(right > 0) :: 2] for right, down in 2 * quarters]
     assert frames[0].shape == (*size[::-1], 3)
     kinds = {}
@@ -74,7 +74,8 @@ def test_what_a_camera_uncovers_has_a_row_of_its_own(variant, tmp_path):
     origin = np.array(load_scene("sphere-spot", size).scene.sensors()[0].world_transform().matrix)[:3, 3].ravel()
     places = [[float(origin[0] + 0.12 * n), *map(float, origin[1:])] for n in range(4)]
     images = [
-        truth_image(load_scene("sphere-spot", size, {"camera.origin": tuple(place)}).scene).airlight for place in places
+        reference_image(load_scene("sphere-spot", size, {"camera.origin": tuple(place)}).scene).airlight
+        for place in places
     ]
     found = compare_frames("sphere-spot", *written(tmp_path, images, changes={"camera.origin": places}, pixel="centre"))
     assert {"all", "disoccluded", "rest"} <= found.masks.keys()
@@ -104,7 +105,7 @@ def test_objects_that_move_are_where_a_scene_file_has_them(variant, tmp_path):
             f'<rotate z="1" angle="{np.degrees(angle)}"/>',
         )
         (tmp_path / "moved.xml").write_text(moved)
-        images.append(truth_image(load_scene(str(tmp_path / "moved.xml")).scene).airlight)
+        images.append(reference_image(load_scene(str(tmp_path / "moved.xml")).scene).airlight)
         ball.append([[scale, 0, 0, x], [0, scale, 0, 0], [0, 0, scale, 1.5 - 1.5 * scale], [0, 0, 0, 1]])
         cos, sin = np.cos(angle), np.sin(angle)
         wall.append([[cos, -sin, 0, 0], [sin, cos, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])

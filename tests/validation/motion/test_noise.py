@@ -9,7 +9,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.motion.noise import Noise, compare_runs, detectable, measure_noise, parts_of_error, student
 from validation.scenes.loading import load_scene
 
@@ -130,7 +130,7 @@ def test_a_bias_of_changing_sign_shows_in_its_square():
 
 
 def test_renders_of_a_scene_from_files(variant, tmp_path):
-    exact = truth_image(load_scene("open-fog", (32, 24)).scene).airlight
+    exact = reference_image(load_scene("open-fog", (32, 24)).scene).airlight
     random = np.random.default_rng(4)
     for run in range(6):
         noisy = 1.02 * exact + 0.05 * exact.mean() * random.normal(size=exact.shape)

@@ -13,7 +13,7 @@ from analytic.errors import InputError
 from realtime.frame.incremental import next_frame
 from realtime.methods.registry import FOG_METHODS
 from realtime.scene.read_scene import read_again, read_scene
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from validation.scenes.animation import animate, moved_parts
 from validation.scenes.changes import change_scene, change_words, changeable, parse_changes
 from validation.scenes.loading import load_scene
@@ -72,7 +72,7 @@ def test_a_scene_that_is_read_again_is_the_scene_read_anew(name):
 
 def test_methods_and_truth_see_the_same_camera_light_and_medium():
     loaded = load_scene("colonnade", (16, 12), CHANGES["colonnade"])
-    scene, truth = read_scene(loaded.scene), read_truth(loaded.scene)
+    scene, truth = read_scene(loaded.scene), read_reference(loaded.scene)
     np.testing.assert_allclose(np.array(scene.camera.origin).ravel(), truth.origin, rtol=1e-6)
     middle = truth.direction.reshape(12, 16, 3)[5:7, 7:9].mean(axis=(0, 1))
     aim = np.subtract((4.7, 1.5, 4.3), (1.3, 1.9, 4.1))
@@ -127,11 +127,11 @@ def test_an_isotropic_medium_gets_a_lobe_for_methods_and_truth(tmp_path, as_file
         mi.parser.write_file(parsed, name)
     scene = load_scene(name, (16, 12), {"medium.g": (0.31,), "medium.sigma_t": (0.2,)}).scene
     assert float(read_scene(scene).medium.phase.g[0]) == pytest.approx(0.31)
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     assert (truth.medium.phase.name, truth.medium.phase.g) == ("hg", pytest.approx(0.31))
     np.testing.assert_allclose(truth.medium.sigma_t, 0.2, rtol=1e-6)
     same = load_scene(name, (16, 12), {"medium.g": (0.0,)}).scene
-    assert read_truth(same).medium.phase.name == "isotropic"
+    assert read_reference(same).medium.phase.name == "isotropic"
     assert changeable(same)["medium.g"].value == (0.0,)
 
 

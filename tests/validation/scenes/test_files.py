@@ -14,7 +14,7 @@ from realtime.scene.phase import PeakedTable
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.frames import render
 from validation.estimates.agreement import agreements
 from validation.scenes.loading import LoadedScene, load_scene
@@ -52,7 +52,7 @@ def load(variant, tmp_path):
 
 
 def image(scene):
-    truth = quadrature_image(read_truth(scene))
+    truth = quadrature_image(read_reference(scene))
     return np.stack([truth.airlight, truth.surface])
 
 
@@ -130,14 +130,14 @@ def test_a_lamp_on_a_quad_of_two_triangles_is_the_rectangle(load, tmp_path, turn
     (tmp_path / "quad.obj").write_text("v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")
     mesh = '<string name="filename" value="quad.obj"/>' + turn + GLOW
     quad, rectangle = (load(shape(plugin, inside)) for plugin, inside in (("obj", mesh), ("rectangle", turn + GLOW)))
-    found, wanted = (read_truth(scene).area[0] for scene in (quad, rectangle))
+    found, wanted = (read_reference(scene).area[0] for scene in (quad, rectangle))
     for name in ("centre", "normal", "area", "power"):
         np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=1e-5, atol=1e-6)
 
 
 def test_a_lamp_on_a_box_is_its_six_sides(load):
     """Each of them a light with extent of its own, shining outwards; together they send what the box sends."""
-    lights = read_truth(load(shape("cube", GLOW, size=0.3))).area
+    lights = read_reference(load(shape("cube", GLOW, size=0.3))).area
     assert sorted(light.name for light in lights) == [f"thing-{number}" for number in range(1, 7)]
     outwards = [light.normal @ (light.centre - (0.1, 0.1, 0.7)) for light in lights]
     np.testing.assert_allclose(outwards, 0.3, rtol=1e-5)
@@ -160,7 +160,7 @@ def test_a_sky_is_seen_through_the_fog_and_lights_it(load):
     box = shape("cube", NULL + '<ref name="interior" id="fog"/>', name="box", size=1.1)
     sky = '<emitter type="constant" id="sky"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>'
     scene = load(LAMP, box, sky, camera=CAMERA.format(""))
-    with_sky = quadrature_image(read_truth(scene), plan=PointPlan(most=2))
+    with_sky = quadrature_image(read_reference(scene), plan=PointPlan(most=2))
     without = image(load(LAMP, box, camera=CAMERA.format("")))[0].reshape(with_sky.airlight.shape)
     np.testing.assert_array_equal(with_sky.airlight > without, without > 0)
     assert with_sky.emitted is not None
@@ -177,7 +177,7 @@ def test_scattering_and_absorption_become_extinction_and_albedo(load, capfd, ver
     old = version < "3"
     camera = CAMERA.format(INSIDE.replace("fog", f"fog-{version}"))
     camera = camera.replace("to_world", "toWorld").replace("<lookat", "<lookAt") if old else camera
-    medium = read_truth(
+    medium = read_reference(
         load(LAMP, camera=camera, media=media.format(*("SA" if old else ("_s", "_a")), version), version=version)
     )
     np.testing.assert_allclose(medium.medium.sigma_t, [0.085, 1.0, 0.085], rtol=1e-6)
@@ -251,7 +251,7 @@ def test_a_coefficient_on_a_grid_is_refused_by_both_readers(load, tmp_path, coef
     mi.VolumeGrid(np.linspace(0.1, 0.9, 8, dtype=np.float32).reshape(2, 2, 2, 1)).write(str(tmp_path / "grid.vol"))
     other = {"albedo": "sigma_t", "sigma_t": "albedo"}[coefficient]
     scene = load(LAMP, media=medium(GRID.format(coefficient, "grid.vol") + f'<float name="{other}" value="0.4"/>'))
-    for read in (read_truth, read_scene):
+    for read in (read_reference, read_scene):
         with pytest.raises((InputError, RealtimeInputError), match=f"{coefficient} differs from place to place"):
             read(scene)
 
@@ -371,7 +371,7 @@ def fog_of(phase, size=(8, 6)):
 def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
     scene = fog_of(tabulated_phase("mie", 2001))
     assert isinstance(read_scene(scene).medium.phase, PeakedTable)
-    truth = quadrature_image(read_truth(scene), checks=2).airlight.reshape(-1)
+    truth = quadrature_image(read_reference(scene), checks=2).airlight.reshape(-1)
     frame = np.array(render(scene, "unshadowed").airlight, dtype=np.float64).T.reshape(-1)
     assert np.sort(frame) == pytest.approx(np.sort(truth), rel=2e-3)
 

@@ -10,7 +10,7 @@ import pytest
 from analytic.errors import InputError
 from analytic.height_fog import HeightFog, Layer
 from reference.quadrature.height_fog import fog_of
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.height_fog import FOG, LAMP, SPOT, SUN, fog_xml
 from validation.scenes.engine_fog import ENGINES, layers_of, parameters_of
 from validation.scenes.height_fog import register_height_fog
@@ -38,7 +38,7 @@ def test_mitsuba_and_the_reference_have_one_density(loaded, clamped):
     constant = '<float name="sigma_0" value="0.004"/><float name="z_1" value="1.7"/>'
     fog = FOG.replace('<float name="z_1" value="0.3"/>', constant + clamped)
     scene = loaded(fog_xml(LAMP, fog=fog + '<float name="scale" value="1.3"/>'))
-    medium = read_truth(scene).medium
+    medium = read_reference(scene).medium
     z = np.linspace(-1, 44, 181)
     found = _extinction(medium.plugin, np.stack([z * 7, 300 - z, z], axis=1))
     np.testing.assert_allclose(found, fog_of(medium).density(z), rtol=3e-6)  # float32 in Mitsuba
@@ -48,7 +48,7 @@ def test_mitsuba_and_the_reference_have_one_density(loaded, clamped):
 
 def test_up_is_the_third_axis_of_the_box(loaded):
     turned = '<transform name="to_world"><scale x="40" y="40" z="43"/><rotate x="1" angle="-90"/></transform>'
-    medium = read_truth(loaded(fog_xml(LAMP, fog=FOG[: FOG.index("<transform")] + turned + "</volume>"))).medium
+    medium = read_reference(loaded(fog_xml(LAMP, fog=FOG[: FOG.index("<transform")] + turned + "</volume>"))).medium
     np.testing.assert_array_equal(medium.up, [0, 1, 0])
     points = np.array([[3.0, 5.0, -7.0], [3.0, 8.0, 7.0]])
     np.testing.assert_allclose(_extinction(medium.plugin, points), fog_of(medium).density(points[:, 1]), rtol=3e-6)
@@ -63,7 +63,7 @@ def test_a_dictionary_gives_the_same_medium(loaded):
         {"type": "heterogeneous", "sigma_t": {"type": "heightfog", "to_world": box} | numbers, "albedo": 0.5}
     )
     points = np.random.default_rng(1).uniform([-50, -50, 0], [50, 50, 40], (32, 3))
-    own = read_truth(scene).medium.plugin
+    own = read_reference(scene).medium.plugin
     np.testing.assert_allclose(_extinction(medium, points), _extinction(own, points), rtol=1e-6)
 
 
@@ -87,12 +87,12 @@ def test_refusals_of_the_volume(loaded, old, new, message):
 def test_refusals_of_the_scene(loaded):
     sun = SUN.replace('z="-0.45"', 'z="0.1"')
     with pytest.raises(InputError, match="light 'sun' is directional and shines from the horizon or below"):
-        read_truth(loaded(fog_xml(sun)))
+        read_reference(loaded(fog_xml(sun)))
     ball = """<shape type="sphere" id="drop"><bsdf type="null"/><ref id="fog" name="exterior"/>
         <medium type="homogeneous" name="interior"/></shape>"""
     with pytest.raises(InputError, match="shape 'drop' bounds a medium in height fog"):
-        read_truth(loaded(fog_xml(LAMP, ball)))
-    truth = read_truth(loaded(fog_xml(SPOT)))
+        read_reference(loaded(fog_xml(LAMP, ball)))
+    truth = read_reference(loaded(fog_xml(SPOT)))
     with pytest.raises(InputError, match="an extinction that differs from place to place"):
         _ = truth.medium.sigma_t
 
@@ -141,7 +141,7 @@ def test_a_scene_in_unreals_words(variant, tmp_path):
         fog = f'<volume type="heightfog" name="sigma_t"><string name="engine" value="{engine}"/>{numbers}{box}</volume>'
         path = tmp_path / "fog.xml"
         path.write_text(fog_xml(LAMP, fog=fog))
-        return read_truth(load_scene(str(path)).scene).medium
+        return read_reference(load_scene(str(path)).scene).medium
 
     medium = load(("FogDensity", 0.5), ("FogHeightFalloff", 4.0), ("FogHeight", 1.5))
     assert medium.layers[0] == pytest.approx((0.0240226507, 1.5, 3.6067376), rel=1e-6)

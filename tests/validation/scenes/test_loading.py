@@ -9,7 +9,7 @@ import pytest
 
 from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.bad_inputs import cloud, scene
 from validation.scenes.loading import load_scene, parse_size
 
@@ -92,7 +92,7 @@ def test_resized_scene_has_the_rays_of_one_built_at_that_size(variant, small_fil
     text = SMALL.replace('value="16"', f'value="{size[0]}"').replace('value="12"', f'value="{size[1]}"')
     expected = mi.load_string(text)
     resized = load_scene(str(small_file), size).scene
-    np.testing.assert_array_equal(read_truth(resized).direction, read_truth(expected).direction)
+    np.testing.assert_array_equal(read_reference(resized).direction, read_reference(expected).direction)
     resized_camera, expected_camera = read_scene(resized).camera, read_scene(expected).camera
     assert (resized_camera.width, resized_camera.height) == size
     np.testing.assert_array_equal(np.array(resized_camera.origin), np.array(expected_camera.origin))

@@ -11,7 +11,7 @@ import pytest
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.light_airlight import lit_parallel_rays
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import FILES, FOG_SCENES, SCENES
@@ -32,7 +32,7 @@ def loaded(name):
 def test_methods_and_truth_can_read_every_scene_alike(variant, name):
     """The two readers share no code: that they agree says that both are right."""
     built = loaded(name)
-    scene, truth = read_scene(built.scene), read_truth(built.scene)
+    scene, truth = read_scene(built.scene), read_reference(built.scene)
     assert built.name == name
     assert built.purpose.endswith(".")
     assert (scene.camera.width, scene.camera.height) == (truth.width, truth.height) == (8, 6)
@@ -57,11 +57,11 @@ def _check_lights(scene, truth):
     (light,) = scene.lights
     (other,) = truth.lights + truth.directional
     if light.kind == "directional":
-        of_methods, of_truth = light.axis, other.direction
+        of_methods, of_reference = light.axis, other.direction
         np.testing.assert_allclose(np.array(light.intensity).reshape(-1), other.irradiance, rtol=3e-7)
     else:
-        of_methods, of_truth = light.position, other.position
-    np.testing.assert_allclose(np.array(of_methods).reshape(-1), of_truth, rtol=3e-7)
+        of_methods, of_reference = light.position, other.position
+    np.testing.assert_allclose(np.array(of_methods).reshape(-1), of_reference, rtol=3e-7)
 
 
 @pytest.mark.claim("scenes-of-arbitrary-numbers")
@@ -100,7 +100,7 @@ def test_scenes_have_as_many_triangles_as_their_records_say(variant, name):
 
 def test_sun_comes_in_by_the_windows_alone(variant):
     """Lit parts of rays lead back to a pane: what the wall's openings let through, in coordinates of the wall."""
-    truth = read_truth(load_scene("windows", (40, 30)).scene)
+    truth = read_reference(load_scene("windows", (40, 30)).scene)
     wall = tomllib.loads(FILES[0].read_text())["windows"]["shapes"][1]
     left, front = wall["corner"][:2]
     intervals = lit_parallel_rays(truth, truth.directional[0], surface_hits(truth).distance).lit

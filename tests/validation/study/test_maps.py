@@ -10,7 +10,7 @@ import pytest
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.registry import Animation
 from validation.study.configuration import configuration, prepared
@@ -42,7 +42,7 @@ def test_errors_of_a_map_are_of_first_order(variant, lamp):
     """The scatter of an order fitted to these 768 pixels is 0.04; grazing rays take up to 0.1 from 1."""
     scene = small_scene(**({"lamp": spot()} if lamp == "spot" else {}))
     sizes = (16, 32, 64, 128, 256)
-    read, truth = read_scene(scene), truth_image(scene).airlight
+    read, truth = read_scene(scene), reference_image(scene).airlight
     metrics = [error_metrics(truth, render_frame(prepared(read, chosen)).airlight) for chosen in marches(*sizes)]
     order, standard_error = fitted_slope(sizes, [each.relative_rmse for each in metrics])
     assert order == pytest.approx(1, abs=0.2)
@@ -68,7 +68,7 @@ def split(method, kernel=None, *, size=(24, 20), render=None, **parameters):
     cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.3)}
     lamp = {"type": "point", "position": [0.3, 0.4, 3.1], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
     scene = mi.load_dict(tiny_scene(size=size, ball=cube, lamp=lamp))
-    truth = truth_image(scene).airlight
+    truth = reference_image(scene).airlight
     return decompose(read_scene(scene), configuration(method, kernel, parameters), truth, render=render)
 
 

@@ -16,7 +16,7 @@ from realtime.scene.features import SceneFeatures
 from realtime.scene.read_scene import read_scene
 from reports.commands.main import run as run_command
 from validation.estimates import agreement
-from validation.estimates.quadrature import truth_of_pixels
+from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
 from validation.study import cost as expected_work
 from validation.study import reference as sampled
@@ -180,7 +180,7 @@ def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache
     again = cell_reference(loaded)
     assert (again.airlight == truth.airlight).all()
     assert again.spent == truth.spent
-    finer = truth_of_pixels(loaded.scene, np.flatnonzero(truth.mask))
+    finer = reference_of_pixels(loaded.scene, np.flatnonzero(truth.mask))
     assert finer.airlight_se is not None
     beyond = []
     for seed in range(16):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.frames import render
 from tests.helpers.scenes import bounded_medium
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.parts import camera, fog, point_light, tabulated_phase
 from validation.study import stated_errors as bounds
 from validation.study.configuration import configuration
@@ -50,7 +50,7 @@ def clipped_edge(along=ACROSS, fov=0.012):
 
 def chords(scene):
     """Return what of each ray lies in the box, by crossings with the triangles of it, in float64 [m]."""
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     parameters = mi.traverse(scene.shapes()[0])
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     a, b, c = np.moveaxis(vertices[np.array(parameters["faces"]).reshape(-1, 3)], 1, 0)
@@ -69,7 +69,7 @@ def chords(scene):
 def errors(scene, method, **parameters):
     """Return truth and the error of an image, (pixels, 3) each [W/(m^2 sr)]."""
     frame = np.asarray(render(scene, method, **parameters).airlight, dtype=np.float64).reshape(-1, 3)
-    truth = truth_image(scene).airlight.reshape(-1, 3)
+    truth = reference_image(scene).airlight.reshape(-1, 3)
     return truth, np.abs(frame - truth)
 
 
@@ -95,7 +95,7 @@ def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth()
 
 def test_a_sweep_counts_no_pixel_whose_ends_are_rounded(monkeypatch):
     scene = clipped_edge()
-    reference, read = of_image(truth_image(scene)), read_scene(scene)
+    reference, read = of_image(reference_image(scene)), read_scene(scene)
     cell = Cell("edge", (16, 12), (), configuration("shadow-planes"), Measure("none"))
     assert run(cell, read, reference, whole=scene)[0].stated.outside == 0
     monkeypatch.setattr(bounds, "END", 0.1 * bounds.END)

@@ -10,7 +10,7 @@ import pytest
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.sunlit import shaded, sun
 from tests.realtime.methods.shadow_planes.test_directional import solid
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 
 FINE = {"sampling": "pixels", "slices": 6000}
 
@@ -21,7 +21,7 @@ def test_against_the_truth(variant, name):
     if name == "along the view":
         # The image of the light is the middle of the image: rays beside it lie along the slices.
         scene = shaded(solid=solid((0.4, 0.3, 0.3), (0.753, -1.67, 1.17)), lamp=sun((-0.1, 4.1, -0.7)))
-    truth = truth_image(mi.load_dict(scene)).airlight
+    truth = reference_image(mi.load_dict(scene)).airlight
     loaded = read(scene)
     errors = [relative_rmse(render(loaded, "min-max", map=size, **FINE).airlight, truth) for size in (64, 1024)]
     # A texel of the slanted walls at every jump, in a shadow that takes a fair part of the light.

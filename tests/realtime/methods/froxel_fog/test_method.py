@@ -15,7 +15,7 @@ from realtime.methods.froxel_fog.accumulation import accumulated
 from realtime.methods.froxel_fog.grid import Grid, column_rays
 from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.phase import Isotropic
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers import probes
 from tests.helpers.frames import frame, read, relative_rmse, truth
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
@@ -51,7 +51,7 @@ def hazy(sigma_t=(0.11, 0.37, 0.93)):
 
 def by_hand(scene, *, width, height, slices, near, far):
     """Do what the method does in NumPy, from the formulas of its documentation; no shadows, no bounds."""
-    truth = read_truth(mi.load_dict(scene))
+    truth = read_reference(mi.load_dict(scene))
     matrix = np.array(mi.load_dict(scene).sensors()[0].world_transform().matrix, dtype=float).reshape(4, 4)
     origin, forward = matrix[:3, 3], matrix[:3, 2]
     half = np.tan(np.radians(0.5 * scene["sensor"]["fov"]))

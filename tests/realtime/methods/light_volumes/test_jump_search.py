@@ -13,7 +13,7 @@ from realtime.shadow_maps.shadow_map import cast_shadow_map
 from tests.helpers.frames import render
 from tests.helpers.light_frames import lamp, loaded_scene
 from tests.helpers.scenes import tiny_scene
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 
 LAMP = (0.13, -0.07, 2.9)
 FLAT = {"ball": None, "lamp": lamp(*LAMP)}
@@ -74,7 +74,7 @@ def test_slopes_are_no_walls(variant):
 def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
     """The frame against the truth: what is left are the corners, and a 64th of a texel."""
     description = tiny_scene(size=(40, 30), **FLAT, plate=plate(-0.31, -0.47))
-    truth = truth_image(mi.load_dict(description)).airlight
+    truth = reference_image(mi.load_dict(description)).airlight
     loaded = mi.load_dict(description)
 
     def error(walls):

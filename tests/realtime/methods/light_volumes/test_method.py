@@ -15,7 +15,7 @@ from realtime.methods.light_volumes.published.mesh import volume_mesh
 from realtime.methods.light_volumes.texel_walls import PLACES, walled_heights
 from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.frames import render, renderer
 from tests.helpers.light_frames import (
@@ -132,7 +132,7 @@ def test_any_map(variant, kind, data):
     drawn_map = with_heights(shadow_map, np.array(heights)[vertex])
     walked = image_frame(walk, run_stages(walk, ((inverse_depth_field(drawn_map),),)))
     drawn = image_frame(mesh, run_stages(mesh, ((volume_mesh(drawn_map, walk.scene.lights[0]),),)))
-    wanted = oracle_airlight(read_truth(loaded), [drawn_map], distance=walked.distance)
+    wanted = oracle_airlight(read_reference(loaded), [drawn_map], distance=walked.distance)
     # As in the frames above; what is lit may be next to nothing, so the scale is the light's.
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - drawn.airlight)) < 1e-13 * scale
@@ -163,7 +163,7 @@ def test_any_walls_in_any_map(variant, kind, data):
     walls = any_walls(rng, drawn_map.faces, data.draw(st.sampled_from([0.0, 0.2, 0.5, 1.0])))
     field = walled_heights(inverse_depth_field(drawn_map), mi.UInt32(walls), mi.UInt32(np.flatnonzero(walls)))
     walked = image_frame(walk, run_stages(walk, ((field,),)))
-    wanted = oracle_airlight(read_truth(loaded), [drawn_map], distance=walked.distance, walls=[walls])
+    wanted = oracle_airlight(read_reference(loaded), [drawn_map], distance=walked.distance, walls=[walls])
     scale = np.max(np.array(walk.scene.lights[0].intensity))
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 

@@ -15,7 +15,7 @@ import pytest
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from validation.metrics.errors import FLOOR
 from validation.scenes.meshes import box, joined, placed
 from validation.scenes.parts import camera, fog, mitsuba_mesh, point_light
@@ -55,7 +55,7 @@ def airlight(scene, precision, **parameters):
 )
 def test_the_default_keeps_the_digits_that_gamma_loses(variant):
     built = slats()
-    truth = quadrature_image(read_truth(built)).airlight
+    truth = quadrature_image(read_reference(built)).airlight
 
     def errors(image, expected=truth):
         return np.abs(image - expected) / np.maximum(truth, FLOOR * truth.mean())

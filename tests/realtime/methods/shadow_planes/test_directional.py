@@ -12,7 +12,7 @@ import pytest
 
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.sunlit import plank, shaded, sun
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.meshes import box, placed
 from validation.scenes.parts import mitsuba_mesh
 
@@ -35,7 +35,7 @@ def scenes() -> dict[str, dict[str, Any]]:
 @pytest.mark.parametrize("name", ["two media", "parallel to edges"])
 def test_against_the_truth(variant, name):
     scene = scenes()[name]
-    truth = truth_image(mi.load_dict(scene)).airlight
+    truth = reference_image(mi.load_dict(scene)).airlight
     loaded = read(scene, "double")
     unshadowed = render(loaded).airlight
     assert relative_rmse(unshadowed, truth) > 0.02  # there is a shadow

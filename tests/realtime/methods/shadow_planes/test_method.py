@@ -7,7 +7,7 @@ import pytest
 
 from realtime.errors import InputError
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.casters import ALL, SOUND
 from tests.helpers.frames import render
 from tests.helpers.light_frames import camera, coloured_fog, lamp
@@ -42,10 +42,10 @@ def scene_with(mesh, *, size=(24, 18), **changes):
 
 
 def truth(scene):
-    return quadrature_image(read_truth(scene))
+    return quadrature_image(read_reference(scene))
 
 
-def assert_is_truth(frame, image, *, rmse=1e-5):
+def assert_is_reference(frame, image, *, rmse=1e-5):
     """Relative RMSE, all but one value in two hundred within 1e-3 (one ray may pass an edge), none negative, no NaN."""
     mean = image.airlight.mean()
     if mean == 0:
@@ -73,7 +73,7 @@ def test_every_mesh(variant, name):
     scene = scene_with(ALL[name]())
     frame, image = render(scene, "shadow-planes"), truth(scene)
     # float32 kernels and crossings: 1e-6, a hundredth of what is asked of a frame.
-    assert_is_truth(frame, image, rmse=5e-6)
+    assert_is_reference(frame, image, rmse=5e-6)
     assert surface_differs(frame, image) < 0.005
 
 
@@ -82,7 +82,7 @@ def test_every_mesh(variant, name):
 def test_every_place_and_light(variant, change):
     scene = scene_with(SOUND["torus"](), **CHANGES[change]())
     frame, image = render(scene, "shadow-planes"), truth(scene)
-    assert_is_truth(frame, image)
+    assert_is_reference(frame, image)
     assert surface_differs(frame, image) < 0.005
 
 

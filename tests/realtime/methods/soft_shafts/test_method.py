@@ -11,7 +11,7 @@ from realtime.scene.read_scene import read_scene
 from tests.helpers.frames import frame, relative_rmse
 from tests.helpers.lamps import lamp_scene
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 from validation.study.configuration import configuration, prepared
 
@@ -97,7 +97,7 @@ def test_pixels_share_points_and_steps(variant):
 @pytest.mark.claim("soft-shafts-steps", tolerance="half of the light; 2 % of it")
 def test_equal_steps_miss_the_peak_next_to_a_light_and_equal_angles_do_not(variant):
     loaded = load_scene("random:1", (80, 60)).scene
-    truth, scene = truth_image(loaded).airlight.mean(), read_scene(loaded)
+    truth, scene = reference_image(loaded).airlight.mean(), read_scene(loaded)
 
     def missing(**settings):
         renderer = prepared(scene, configuration("soft-shafts", None, settings))

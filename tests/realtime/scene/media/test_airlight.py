@@ -11,12 +11,12 @@ import pytest
 from realtime.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers import airlight_sum, frames
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.sunlit import box_part, cube, fog_sphere, sphere_part
-from validation.estimates.quadrature import truth_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 from validation.study.configuration import configuration, prepared
 
@@ -26,13 +26,13 @@ SPHERE, CUBE = sphere_part(SPHERE_AT, RADIUS), box_part(CUBE_AT)
 render = partial(frames.render, precision="double")
 
 
-def truth_of(scene):
-    return read_truth(mi.load_dict(scene))
+def reference_of(scene):
+    return read_reference(mi.load_dict(scene))
 
 
 def summed(scene, parts, *, steps=500, **how):
     """Sum the airlight over small steps of every chord."""
-    truth = truth_of(scene)
+    truth = reference_of(scene)
     lamp = airlight_sum.Light(truth.lights[0].position, 1.0, truth.lights[0].intensity)
     image = [
         airlight_sum.airlight_sum(truth.origin, direction, lamp, parts, steps=steps, **how)
@@ -72,7 +72,7 @@ def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
     seen = render(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
     clear = render(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.0)))
     assert np.array_equal(seen.distance, clear.distance)
-    truth = truth_of(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
+    truth = reference_of(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
     distance = seen.distance.ravel()
     hit = np.isfinite(distance) & (clear.surface[..., 0].ravel() > 0)
     point = truth.origin + distance[hit, None] * truth.direction[hit]
@@ -94,7 +94,7 @@ def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
 def test_an_ambient_field_fills_bounded_media(variant):
     scene = clear_scene(ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.7))
     gain = render(scene, "shadow-planes", ambient=0.3).airlight - render(scene, "shadow-planes").airlight
-    truth = truth_of(scene)
+    truth = reference_of(scene)
     near, far = SPHERE.chord(truth.origin, truth.direction)
     chord = far - near
     expected = 0.3 * np.array([0.9, 0.4, 0.3]) * (1 - np.exp(-0.7 * chord))[:, None]
@@ -129,6 +129,6 @@ def test_random_scenes_against_the_truth(variant, scene, bound):
     1.7e-3); legs pass edges of boxes on their way to fog and other boxes (146: 1.2e-3).
     """
     loaded = load_scene(scene, (64, 48)).scene
-    truth = truth_image(loaded).airlight
+    truth = reference_image(loaded).airlight
     frame = render_frame(prepared(read_scene(loaded), configuration("shadow-planes")))
     assert relative_rmse(frame.airlight, truth) < bound

@@ -10,7 +10,7 @@ from realtime.kernels.exact import exact
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.density_grid import INSIDE, ROUGH, SPOT, grid_xml, volume
 from tests.helpers.frames import relative_rmse
 from tests.helpers.height_fog import LAMP, SUN
@@ -31,7 +31,7 @@ def scene(variant, tmp_path):
 @pytest.mark.parametrize("light", [LAMP, INSIDE, SPOT, SUN])
 def test_a_ray_march_goes_to_the_reference(scene, light):
     loaded = scene(light)
-    reference = quadrature_image(read_truth(loaded), checks=0)
+    reference = quadrature_image(read_reference(loaded), checks=0)
     errors = []
     for precision, steps in (("single", 400), ("double", 100), ("double", 400)):
         frame = render_frame(frame_renderer(read_scene(loaded, precision), METHODS["ray-march"], steps=steps))
@@ -45,7 +45,7 @@ def test_a_ray_march_goes_to_the_reference(scene, light):
 @pytest.mark.claim("density-grid-methods", tolerance="5 %: froxels of 6 cm in a box that ends within them")
 def test_froxels_go_to_the_reference(scene):
     loaded = scene(SUN)
-    reference = quadrature_image(read_truth(loaded), checks=0)
+    reference = quadrature_image(read_reference(loaded), checks=0)
     how = {"slices": 256, "shadow": "ray"}
     frame = render_frame(frame_renderer(read_scene(loaded), METHODS["froxel-fog"], **how))
     assert relative_rmse(frame.airlight, reference.airlight) < 0.05
@@ -54,7 +54,7 @@ def test_froxels_go_to_the_reference(scene):
 @pytest.mark.claim("density-grid-methods", tolerance="3 % of 200 steps in a third of the box: edges of a grille")
 def test_the_built_in_scene(variant):
     loaded = load_scene("smoke", (24, 18)).scene
-    reference = quadrature_image(read_truth(loaded), checks=8)
+    reference = quadrature_image(read_reference(loaded), checks=8)
     assert reference.left == 0
     assert reference.airlight_bound.max() < 1e-4 * reference.airlight.mean()
     frame = render_frame(frame_renderer(read_scene(loaded), METHODS["ray-march"], steps=200))

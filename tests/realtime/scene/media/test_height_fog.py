@@ -21,7 +21,7 @@ from realtime.scene.media.height_fog import HeightFog, Layer, phi
 from realtime.scene.phase import HenyeyGreenstein
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.frames import relative_rmse
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml, rows
 from validation.scenes.loading import load_scene
@@ -138,7 +138,7 @@ def frame(scene, method, kernel=exact, **parameters):
 @pytest.mark.parametrize("lights", [(LAMP, SPOT), (SUN,)], ids=["local", "sun"])
 def test_frames_are_the_reference(scene, lights):
     loaded = scene(*lights)
-    truth = quadrature_image(read_truth(loaded), checks=0)
+    truth = quadrature_image(read_reference(loaded), checks=0)
     planes = frame(loaded, "shadow-planes")
     assert relative_rmse(planes.airlight, truth.airlight) < 1e-5
     assert relative_rmse(planes.surface, truth.surface) < 1e-4
@@ -169,7 +169,7 @@ def test_a_running_sum_of_the_depth(scene):
 @pytest.mark.parametrize("name", ["street", "meadow", "valley"])
 def test_built_in_scenes(variant, name):
     loaded = load_scene(name, (24, 18)).scene
-    truth = quadrature_image(read_truth(loaded))
+    truth = quadrature_image(read_reference(loaded))
     assert truth.airlight_bound.max() < 1e-6 * truth.airlight.mean()
     assert relative_rmse(frame(loaded, "shadow-planes").airlight, truth.airlight) < 1e-5
 

@@ -136,7 +136,7 @@ def slab_clouds():
     return replace(clouds, direction=np.array(ways), origin=np.array([0.0, 0.0, 311.0]))
 
 
-def slab_truth(clouds):
+def slab_reference(clouds):
     """Return the radiance of the slab along `slab_rays`; another test holds `slab_radiance` against DISORT."""
     cloud, sun = clouds.clouds[0], clouds.suns[0]
     tau, g = float(cloud.sigma_t[1]) * 291.7, cloud.phase.g
@@ -153,7 +153,7 @@ def slab_truth(clouds):
 )
 def test_the_slab_is_that_of_disort(variant):
     clouds = slab_clouds()
-    truth = slab_truth(clouds)
+    truth = slab_reference(clouds)
     batches = paths(clouds, 32, 256)
     z = ((batches.mean[0] - truth) / batches.standard_error[0])[:, 1]
     assert np.all(batches.standard_error[0] < 0.06 * truth)
@@ -170,7 +170,7 @@ def test_the_slab_is_that_of_disort(variant):
 def test_standard_errors_cover_the_truth_as_often_as_they_say(variant):
     """24 runs of 12 directions: 288 intervals, of which 88.7 % to 98 % hold by chance at a level of 1e-4 or so."""
     clouds = slab_clouds()
-    truth = slab_truth(clouds)[:, 1]
+    truth = slab_reference(clouds)[:, 1]
     held = []
     for run in range(24):
         batches = paths(clouds, 32, 64, first=1000 + 32 * run)

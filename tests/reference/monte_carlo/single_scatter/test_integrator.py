@@ -14,7 +14,7 @@ from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.monte_carlo.single_scatter.stretches import double_ray
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers import airlight_sum
 from tests.helpers.scenes import spot, tiny_scene
 
@@ -26,7 +26,7 @@ def _load(**changes):
 
 
 def _run(scene, *, samples=64, first_seed=0, batches=_BATCHES):
-    truth = read_truth(scene)
+    truth = read_reference(scene)
     done = single_scatter_batch(truth, first_seed, samples)
     for seed in range(first_seed + 1, first_seed + batches):
         done = merged(done, single_scatter_batch(truth, seed, samples))
@@ -94,7 +94,7 @@ def test_agrees_with_the_quadrature(variant, name):
     below 0.1 %; surfaces, which need no sampling, to the rounding of single precision.
     """
     scene = _load(**_case(name))
-    truth = quadrature_image(read_truth(scene))
+    truth = quadrature_image(read_reference(scene))
     batches = _run(scene)
     expected = truth.airlight.reshape(-1, 3)
     mean, error = batches.mean[0], batches.standard_error[0]

@@ -7,7 +7,7 @@ import pytest
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.density_grid import ROUGH, grid_xml, volume
 from tests.helpers.height_fog import fog_xml
 from validation.scenes.loading import load_scene
@@ -71,7 +71,7 @@ def test_a_panel_in_height_fog(variant, tmp_path):
 def compare(tmp_path, medium, light, traces, *, samples):
     path = tmp_path / "scene.xml"
     path.write_text(scene_file(medium, light, path))
-    truth = read_truth(load_scene(str(path)).scene)
+    truth = read_reference(load_scene(str(path)).scene)
     image = quadrature_image(truth, checks=0)
     known = image.replicate_means.mean(axis=1)[:, 0]
     of_known = image.replicate_means.std(axis=1, ddof=1)[:, 0] / np.sqrt(image.replicate_means.shape[1])

@@ -4,14 +4,14 @@ import mitsuba as mi
 import pytest
 
 from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.volpath import assert_volpath_agrees
 
 
 @pytest.fixture(scope="module")
 def truth(variant):
-    return read_truth(mi.load_dict(tiny_scene()))
+    return read_reference(mi.load_dict(tiny_scene()))
 
 
 def test_one_kernel_serves_any_number_of_samples(truth):
@@ -41,5 +41,5 @@ def test_agrees_with_the_quadrature(variant, colour):
     fog = tiny_scene()["fog"]
     if colour == "coloured":
         fog |= {"sigma_t": {"type": "rgb", "value": [0.1, 0.3, 0.7]}, "has_spectral_extinction": True}
-    truth = read_truth(mi.load_dict(tiny_scene(fog=fog)))
+    truth = read_reference(mi.load_dict(tiny_scene(fog=fog)))
     assert_volpath_agrees(truth, batches=32, least_precision=0.02)

@@ -10,7 +10,7 @@ import pytest
 
 from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_truth
+from reference.scene.read import read_reference
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.loading import load_scene
 from validation.scenes.meshes import grid, rotation
@@ -26,7 +26,7 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
     for seed in seeds:
         loaded = load_scene(f"random:{seed}", (16, 12))
         drawn = drawn_values(loaded.name)
-        ours, truth = read_scene(loaded.scene), read_truth(loaded.scene)
+        ours, truth = read_scene(loaded.scene), read_reference(loaded.scene)
         assert len(ours.lights) + len(ours.area_lights) == len(drawn["lights"])
         assert len(truth.lights) + len(truth.area) + len(truth.directional) == len(drawn["lights"])
         bounded = [medium for medium in drawn["media"] if medium["bounds"] != "endless"]
