@@ -8,6 +8,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from analytic.geometry import foot_and_height
+from analytic.height_fog import HeightFog as HostFog
+from analytic.height_fog import HeightRays as HostRays
+from analytic.height_fog import Layer as HostLayer
+from analytic.height_fog import height_fog_segments
+from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.exact import exact
@@ -23,7 +29,7 @@ from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from tests.helpers.frames import relative_rmse
-from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml, rows
+from tests.helpers.height_fog import LAMP, SPOT, SUN, Row, fog_xml, rows
 from validation.scenes.loading import load_scene
 
 
@@ -83,6 +89,7 @@ def by_tag(*tags, clamped=False):
 SUNS = ("sun", "sun-infinite", "sun-resonant")
 GENERIC = ("generic", "large-H", "horizontal", "grazing", "above", "below")
 HARD = ("small-H", "near-light", "strong-g")
+_STEEP = ((1.5, 0.4), (0.3, 2.0), (0.02, 15.0))  # extinction [1/m] and scale height [m]
 
 
 @pytest.mark.claim("height-fog-kernels", tolerance="1e-5 in float32 to an exponent of 30, 1e-12 in float64")
@@ -103,6 +110,30 @@ def test_panels_on_certified_rays(variant, clamped):
         assert relative_errors(by_tag(*HARD), "double").max() < 1e-8
         # Beside a light the rounding of the row's own coordinates is a part of the distance.
         assert relative_errors(by_tag("small-H"), "single").max() < 2e-5
+
+
+@pytest.mark.claim("height-fog-kernels", tolerance="1e-4 in float32: depths of 30 have a rounding of 1e-5 or two")
+@pytest.mark.parametrize("clamped", [False, True])
+def test_no_panel_misses_a_layer(variant, clamped):
+    """Thin layers, long rays and lights far above: a panel that is too long for any of them is wrong by a tenth."""
+    random, count = np.random.default_rng(5), 3000
+    fogs = [HostFog((HostLayer(s, 0.0, h), HostLayer(0.05, 1.0, 40.0)), 0.0, clamped) for s, h in _STEEP]
+    origin, direction, place = random.normal(size=(3, count, 3)).astype(np.float32).astype(np.float64)
+    origin, place = 5 * origin, place * np.exp(random.uniform(-2, 3, (count, 1))).astype(np.float32)
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    x0 = np.where(random.random(count) < 0.5, 0, random.uniform(0, 10, count)).astype(np.float32)
+    x1 = x0 + np.exp(random.uniform(-3, 4, count)).astype(np.float32)
+    foot, height = foot_and_height(origin, direction, place)
+    lines = HostRays(origin[:, 2], direction[:, 2], foot, height, place[:, 2])
+    for fog in fogs:
+        values = height_fog_segments(fog, lines, x0, x1, PhaseFunction("hg", g=0.35), rtol=1e-8)[0]
+        chosen = [
+            Row("drawn", False, fog, PhaseFunction("hg", g=0.35), *row)
+            for row in zip(origin, direction, place, x0, x1, values)
+            if row[-1] > 1e-12 * np.quantile(values, 0.9)
+        ]
+        assert len(chosen) > count / 3
+        assert relative_errors(chosen, "single").max() < 1e-4
 
 
 @pytest.mark.claim("height-fog-kernels", tolerance="1e-4 for nine of ten generic rays, as asked for")
