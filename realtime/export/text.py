@@ -17,9 +17,9 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.export.languages import LANGUAGES
-from realtime.kernels.exact import _DEEPEST, _DEPTH, _MOST, _NODES
-from realtime.kernels.quadrature import _positive_nodes
-from realtime.numerics.functions import _EXP2, _SINH, LOG2_E, unit_nodes
+from realtime.kernels.exact import DEEPEST, MOST_PANELS, PANEL_DEPTH, PANEL_NODES
+from realtime.kernels.quadrature import positive_nodes
+from realtime.numerics.functions import EXP2, LOG2_E, SINH, unit_nodes
 from realtime.scene.media.medium import OPTICAL_REACH
 from realtime.scene.phase import Hazy, HenyeyGreenstein, HgDraine, Isotropic, Murky, Phase, Rayleigh
 
@@ -92,14 +92,14 @@ float al_exp(float x) {{
     AL_PRECISE float r = y - n * {_number(_LN2_HIGH)};
     AL_PRECISE float s = r - n * {_number(math.log(2) - _LN2_HIGH)};
     float f = s * {_number(LOG2_E)};
-    float p = {_polynomial(_EXP2, "f")};
+    float p = {_polynomial(EXP2, "f")};
     return p * intBitsToFloat((int(n) + 127) * 8388608);
 }}
 
 // sinh y, |y| <= 1.65.
 float al_sinh(float y) {{
     float q = y * y;
-    return y * ({_polynomial(_SINH, "q")});
+    return y * ({_polynomial(SINH, "q")});
 }}
 
 // 2 atanh t, |t| <= 0.24.
@@ -224,7 +224,7 @@ def _exact(phase: Phase) -> str:
     float tail = 1.0;
     float widest = {_number(phase.reach.panel)};
 """
-    places, weights = zip(*unit_nodes(_NODES), strict=True)
+    places, weights = zip(*unit_nodes(PANEL_NODES), strict=True)
     return f"""{_array("AL_X", places)}
 {_array("AL_W", weights)}
 
@@ -235,12 +235,12 @@ def _exact(phase: Phase) -> str:
     float c1 = sqrt(f1 * f1 + 1.0);
     float width = al_asinh((difference / scale) * ((f + f1) / (f1 * c + f * c1)));
     float rate = sigma_t * h * scale;
-    float count = ceil(max(width / widest, rate * c * width / {_number(_DEPTH)}));
-    int panels = int(min(max(count, 1.0), {_number(_MOST)}));
+    float count = ceil(max(width / widest, rate * c * width / {_number(PANEL_DEPTH)}));
+    int panels = int(min(max(count, 1.0), {_number(MOST_PANELS)}));
     float part = width / float(panels);
-    float sinhs[{_NODES}];
-    float lesses[{_NODES}];
-    for (int i = 0; i < {_NODES}; i += 1) {{
+    float sinhs[{PANEL_NODES}];
+    float lesses[{PANEL_NODES}];
+    for (int i = 0; i < {PANEL_NODES}; i += 1) {{
         float y = al_sinh(0.5 * part * AL_X[i]);
         sinhs[i] = 2.0 * y * sqrt(y * y + 1.0);
         lesses[i] = 2.0 * y * y;
@@ -251,12 +251,12 @@ def _exact(phase: Phase) -> str:
     float depth = 0.0;
     float total = 0.0;
     for (int k = 0; k < panels; k += 1) {{
-        for (int i = 0; i < {_NODES}; i += 1) {{
+        for (int i = 0; i < {PANEL_NODES}; i += 1) {{
             float more = f * lesses[i] + c * sinhs[i];
             float e = scale * (f + more);
             float up = 1.0 / (e * e + 1.0);
             float value = (c + (f * sinhs[i] + c * lesses[i])) * up * al_phase(e * e * up, up, g);
-            total = total + AL_W[i] * value * al_exp(max(-depth - rate * more, -{_number(_DEEPEST / LOG2_E)}));
+            total = total + AL_W[i] * value * al_exp(max(-depth - rate * more, -{_number(DEEPEST / LOG2_E)}));
         }}
         float step = f * less1 + c * sinh1;
         c = c + (f * sinh1 + c * less1);
@@ -269,7 +269,7 @@ def _exact(phase: Phase) -> str:
 
 
 def _quadrature(phase: Phase, nodes: int) -> str:
-    places, weights = zip(*_positive_nodes(nodes), strict=True)
+    places, weights = zip(*positive_nodes(nodes), strict=True)
     half = len(places)
     arguments = "height, {}, {}, sigma_t, g"
     whole = "al_panel(foot, " + arguments.format("x0", "x1") + ")"

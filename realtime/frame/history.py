@@ -97,14 +97,10 @@ def _same_surface(past: PastFrames, camera: Camera, pixel: PerRay, distance: Met
     aim = aim * dr.rcp(dr.norm(aim))
     moved = mi.Vector3d(camera.origin) - mi.Vector3d(last.origin)
     away = dr.select(there, dr.fma(aim, mi.Float64(dr.select(there, distance, 0)), moved), aim)
-    forward, left, up = last.axes
-    depth = dr.dot(away, forward)
-    known = depth > 0
-    depth = dr.select(known, depth, 1)
-    x = last.grid.half_width - dr.dot(away, left) / (depth * dr.squared_norm(left))
-    y = last.grid.half_height - dr.dot(away, up) / (depth * dr.squared_norm(up))
+    i, j, depth = last.project(away)
+    x, y = last.grid.half_width - i, last.grid.half_height - j
     # Beside the image no whole number has room for the place.
-    known &= (x > -1) & (x < camera.width) & (y > -1) & (y < camera.height)
+    known = (depth > 0) & (x > -1) & (x < camera.width) & (y > -1) & (y < camera.height)
     x, y = dr.select(known, x, 0), dr.select(known, y, 0)
     column, row = mi.Int32(dr.floor(x)), mi.Int32(dr.floor(y))
     right, down = Float(x - dr.floor(x)), Float(y - dr.floor(y))

@@ -161,12 +161,12 @@ def _half_angle(s, r, inverse, height_squared):
     return dr.select(behind, large, small), dr.select(behind, small, large)
 
 
-_NODES = 8
-_MOST = 160  # panels; no segment needs as many, but a loop over values that are not numbers must end too
-_DEPTH = 10.5  # T1
+PANEL_NODES = 8  #: of a panel in float32
+MOST_PANELS = 160  #: no segment needs as many, but a loop over values that are not numbers must end too
+PANEL_DEPTH = 10.5  #: T1
 _SOFT = 0.85  #: w for a light whose intensity falls off
 _NO_RATE = 1e-30
-_DEEPEST = 116.0  # e^-80
+DEEPEST = 116.0  #: power of 2 beyond which nothing is left: e^-80
 
 
 def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None):
@@ -184,7 +184,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
     count = panel_count(phase, width, largest * scale * c * width, soft=weight is not None)
     part_of_all = dr.rcp(dr.maximum(Float(count), 1))
     part = width * part_of_all
-    nodes = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(_NODES)]
+    nodes = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(PANEL_NODES)]
     sinh_end, less_end = _offset(part)
     # Not 0 in a vacuum, where Dr.Jit would see a depth that no turn of the loop changes, and drop it from the state.
     rates = [dr.minimum(-decay * scale * LOG2_E, -_NO_RATE) for decay in decays]
@@ -213,7 +213,7 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
 
 
 def _kept(depth):
-    return exp2_bounded(dr.maximum(depth, -_DEEPEST))
+    return exp2_bounded(dr.maximum(depth, -DEEPEST))
 
 
 def panel_count(phase: Phase, width, depth, *, soft: bool = False):
@@ -222,9 +222,9 @@ def panel_count(phase: Phase, width, depth, *, soft: bool = False):
     widest = phase.panel_width(Float)
     if soft:
         widest = dr.minimum(widest, _SOFT)
-    count = dr.maximum(width / widest, depth * (1 / _DEPTH))
+    count = dr.maximum(width / widest, depth * (1 / PANEL_DEPTH))
     # As whole numbers: a minimum of floats lets through what is no number, as 2^32 - 1 panels.
-    return dr.select(width > 0, dr.minimum(mi.UInt32(dr.ceil(count)), _MOST), 0)
+    return dr.select(width > 0, dr.minimum(mi.UInt32(dr.ceil(count)), MOST_PANELS), 0)
 
 
 def _offset(u):
@@ -235,7 +235,7 @@ def _offset(u):
 
 
 #: In float64: nodes of the isotropic case, and of each panel of the others; the phase function says how many panels.
-_ISOTROPIC_DOUBLE, _PANEL_NODES = 40, 24
+_ISOTROPIC_DOUBLE, _NODES_DOUBLE = 40, 24
 
 
 def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
@@ -342,7 +342,7 @@ def _double_mean(phase: Phase, start, scale, width, decays, weight):
 
     def panel(index, total):
         start = Float(index)
-        part = sum(share * node((start + fraction) * (1 / count)) for fraction, share in unit_nodes(_PANEL_NODES))
+        part = sum(share * node((start + fraction) * (1 / count)) for fraction, share in unit_nodes(_NODES_DOUBLE))
         return index + 1, total + part * (1 / count)
 
     _, total = dr.while_loop(

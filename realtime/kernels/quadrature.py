@@ -66,7 +66,7 @@ def _panels(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
 
 
 @lru_cache
-def _positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
+def positive_nodes(nodes: int) -> tuple[tuple[float, float], ...]:
     """Return the positive half of the Gauss-Legendre nodes of [-1, 1] with their weights."""
     if nodes < 2 or nodes % 2:
         raise InputError(f"nodes: got {nodes}, wanted a positive even number of quadrature nodes")
@@ -91,7 +91,7 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Homogeneous, light: L
         (half, e_mid, c_mid),
         phase=medium.phase,
         light=light,
-        nodes=_positive_nodes(nodes),
+        nodes=positive_nodes(nodes),
     )
     return total * half * (2 / h) * dr.exp(-sigma_t * path)
 

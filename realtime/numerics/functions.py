@@ -59,7 +59,7 @@ def _diamond_angle(x, y, select):
 
 
 #: Coefficients of 2^f on [-1/2, 1/2], highest power first: a Remez fit of degree 6 with relative error below 1.5e-8.
-_EXP2 = (
+EXP2 = (
     1.5353362e-4,
     1.3398874e-3,
     9.6184373e-3,
@@ -69,7 +69,7 @@ _EXP2 = (
     1.0,
 )
 #: Coefficients of sinh(y)/y in y^2 for |y| up to `WIDEST`, highest power first: relative error below 2e-8.
-_SINH = (2.9275649e-6, 1.9801041e-4, 8.3337125e-3, 1.6666654e-1, 1.0)
+SINH = (2.9275649e-6, 1.9801041e-4, 8.3337125e-3, 1.6666654e-1, 1.0)
 WIDEST = 1.65  #: largest argument of `sinh_bounded`
 LOG2_E = 1.4426950408889634
 
@@ -103,8 +103,8 @@ def exp_expm1_bounded(x):
         less = dr.select(dr.abs(x) > 1, power - 1, dr.select(power == 1, x, (power - 1) * (x / dr.log(power))))
         return power, less
     f, n = _power_of_two(x)
-    value = Float(_EXP2[0])
-    for coefficient in _EXP2[1:-1]:
+    value = Float(EXP2[0])
+    for coefficient in EXP2[1:-1]:
         value = dr.fma(value, f, coefficient)
     Int = dr.int32_array_t(Float)
     scale, rest = dr.reinterpret_array(Float, (Int(n) + 127) << 23), value * f
@@ -130,8 +130,8 @@ def sinh_bounded(y):
     Valid for |y| <= 1.65. Relative error below 2e-7.
     """
     square = dr.square(y)
-    value = type(y)(_SINH[0])
-    for coefficient in _SINH[1:]:
+    value = type(y)(SINH[0])
+    for coefficient in SINH[1:]:
         value = dr.fma(value, square, coefficient)
     return value * y
 
@@ -149,8 +149,8 @@ def _power_of_two(x):
 def _scaled_power(f, n):
     """Return 2^(n + f) for n a whole number and |f| <= 1/2."""
     Float = type(f)
-    value = Float(_EXP2[0])
-    for coefficient in _EXP2[1:]:
+    value = Float(EXP2[0])
+    for coefficient in EXP2[1:]:
         value = dr.fma(value, f, coefficient)
     Int = dr.int32_array_t(Float)
     return dr.reinterpret_array(Float, dr.reinterpret_array(Int, value) + (Int(n) << 23))

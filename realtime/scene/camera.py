@@ -34,8 +34,7 @@ class PixelGrid:
     """What kernels read of the size of an image; opaque, so that one kernel serves images of all sizes."""
 
     columns: Any  #: width of the image [pixels]
-    reciprocal: Any  #: 2^(31 + shift) / width, rounded up
-    shift: Any  #: bits of width - 1
+    inverse: Any  #: of that width, in float64 [1/pixels]
     half_width: Any  #: (W - 1)/2 [pixels]
     half_height: Any  #: (H - 1)/2 [pixels]
 
@@ -65,6 +64,16 @@ class Camera:
         """One pixel up, at distance 1."""
         return type(self.origin)(self.axes[2])
 
+    def project(self, away) -> tuple[Any, Any, Any]:
+        """Return how many pixels left of and above the middle of the image vectors from the pinhole point, and how far.
+
+        The third is their part along `forward`, in the unit of `away`; where it is not above 0 the others mean nothing.
+        """
+        forward, left, up = (type(away)(axis) for axis in self.axes)
+        depth = dr.dot(away, forward)
+        i, j = (dr.dot(away, side) / (depth * dr.squared_norm(side)) for side in (left, up))
+        return i, j, depth
+
 
 @dataclass(frozen=True)
 class HostCamera:
@@ -80,9 +89,8 @@ class HostCamera:
 
 def pixel_grid(width: int, height: int) -> PixelGrid:
     """Return the pixels of an image for a `Camera`."""
-    shift = (width - 1).bit_length()
-    columns, reciprocal, bits = map(mi.UInt32, (width, -(-(1 << (31 + shift)) // width), shift))
-    grid = PixelGrid(columns, reciprocal, bits, mi.Float64(0.5 * (width - 1)), mi.Float64(0.5 * (height - 1)))
+    halves = (mi.Float64(0.5 * (side - 1)) for side in (width, height))
+    grid = PixelGrid(mi.UInt32(width), mi.Float64(1 / width), *halves)
     dr.make_opaque(grid)
     return grid
 
@@ -90,11 +98,10 @@ def pixel_grid(width: int, height: int) -> PixelGrid:
 def row_and_column(camera: Camera, pixel):
     """Return the rows and columns of pixels, given their numbers, row times width plus column, below 2^31.
 
-    A division by a number that the compiler does not know takes as long as ten others. With R = 2^(31 + s)/W + d, 0 <=
-    d < 1, is p R = 2^(31 + s) p/W + p d, and the last term too small to lead to the next whole number as long as p W <
-    2^(31 + s): W <= 2^s, so for p < 2^31 (Granlund and Montgomery 1994, Theorem 4.2).
+    A division of whole numbers by one that the compiler does not know takes as long as ten products. So they are
+    multiplied in float64: of (p + 1/2)/W the rounding is below the distance 1/(2 W) to the next whole number.
     """
-    row = dr.mul_hi(2 * pixel, camera.grid.reciprocal) >> camera.grid.shift
+    row = mi.UInt32((mi.Float64(pixel) + 0.5) * camera.grid.inverse)
     return row, pixel - row * camera.grid.columns
 
 

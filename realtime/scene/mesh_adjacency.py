@@ -282,6 +282,8 @@ def _connected_components(triangles, edges, entries):
 def scene_of(shapes: Sequence[Any], others: dict[str, Any] | None = None) -> Any:
     """Return a Mitsuba scene of shapes, all of which keep their names; `others` is what else is in its dictionary."""
     names = [shape.id() for shape in shapes]
+    # A key of Mitsuba's dictionaries becomes the name of the shape, may hold no dots, and of two shapes with one key
+    # the last alone is left: so keys are numbers, and the shapes get their names back.
     parts = {f"shape-{number}": shape for number, shape in enumerate(shapes)}
     scene = mi.load_dict({"type": "scene"} | (others or {}) | parts)
     for shape, name in zip(shapes, names, strict=True):

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from realtime.clouds.canonical.coordinates import SETS
-from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels, panel_weights
+from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
 from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
 from realtime.clouds.slab_orders.phases import SlabPhase
 
@@ -165,45 +165,12 @@ class DirectionalMoments:
         return self._eigenmodes[m]
 
 
-class _Lines:
+class _Lines(Transport):
     """Straight lines through the panels of a slab along some cosines, first those that go up."""
 
     def __init__(self, panels: DepthPanels, mu: Array, number: type):
+        super().__init__(panels, mu, number)
         self.sines = np.sqrt((1 - mu) * (1 + mu))[:, None].astype(number)
-        self.sides: list[tuple[int, slice, Array]] = []
-        above = int((mu > 0).sum())
-        for sign, side in ((1, slice(0, above)), (-1, slice(above, mu.size))):
-            if side.start == side.stop:
-                continue
-            weights, fade = panel_weights(np.diff(panels.edges)[::-sign], np.abs(mu[side]), panels.nodes.shape[1])
-            # Of the sources, and last of what enters a panel: (P, J, K + 1, K + 1)
-            both = np.moveaxis(np.concatenate([weights, fade[:, :, None]], axis=2), 3, 1)
-            self.sides.append((sign, side, np.ascontiguousarray(both.astype(number))))
-
-    def __call__(self, source: Array, places: Sequence[int], *, inside: bool) -> tuple[Array, Array]:
-        """Return the radiance of a source (P, K, J, F) at its nodes, and at edges, (D, J, F); none enters from outside.
-
-        `inside` says whether the nodes are wanted.
-        """
-        panels, nodes, directions, count = source.shape
-        radiance = np.empty_like(source) if inside else source[:0]
-        wanted = np.zeros((len(places), directions, count), source.dtype)
-        for sign, side, weights in self.sides:
-            given = np.zeros((side.stop - side.start, nodes + 1, count), source.dtype)
-            result = np.empty_like(given)
-            for step in range(panels):
-                panel = panels - 1 - step if sign > 0 else step
-                # Upward light runs through the nodes backwards.
-                given[:, :nodes] = source[panel, ::-sign, side].transpose(1, 0, 2)
-                np.matmul(weights[step], given, out=result)
-                if inside:
-                    radiance[panel, ::-sign, side] = result[:, :nodes].transpose(1, 0, 2)
-                given[:, nodes] = result[:, nodes]
-                edge = panel if sign > 0 else panel + 1
-                for number, at in enumerate(places):
-                    if at == edge:
-                        wanted[number, side] = given[:, nodes]
-        return radiance, wanted
 
 
 class _Run:
@@ -215,8 +182,7 @@ class _Run:
         narrowest = max(smallest, _NARROWEST)
         self.panels = depth_panels(tau, narrowest, depths=depths, count=slab._nodes, widest=_WIDEST)
         self._places = [int(np.argmin(np.abs(self.panels.edges - depth))) for depth in depths]
-        self.streams = _Lines(self.panels, slab._rule.mu, slab._type)
-        self.views = _Lines(self.panels, slab._views, slab._type)
+        self.streams, self.views = (_Lines(self.panels, mu, slab._type) for mu in (slab._rule.mu, slab._views))
 
     def shine(self, suns: Array) -> None:
         """Light the slab by some suns."""
@@ -276,7 +242,7 @@ class _Run:
     def _carried(self, lines: _Lines, sources: Sequence[Array], *, inside: bool) -> tuple[list[Array], list[Array]]:
         """Return the radiance of the sources of all modes, at nodes and at the wanted depths."""
         ends = np.cumsum([source.shape[-1] for source in sources])[:-1]
-        at_nodes, at_depths = lines(np.concatenate(sources, axis=-1), self._places, inside=inside)
+        at_nodes, at_depths = lines.sweep(np.concatenate(sources, axis=-1), self._places, inside=inside)
         return np.split(at_nodes, ends, axis=-1), np.split(at_depths, ends, axis=-1)
 
     def rest(self, fields: Sequence[Array]) -> list[Array]:

@@ -75,50 +75,62 @@ def depth_panels(
 
 
 class Transport:
-    """Light from a source to all depths of a slab, for some directions.
+    """Light from sources to all depths of a slab along some directions, in arrays whose numbers are of type `number`.
 
-    `panels`: the grid; `mu`: (J,) cosines, positive upwards, none of them 0.
+    `panels`: the grid; `mu`: (J,) cosines, positive upwards, none of them 0. No light enters from outside.
     """
 
-    def __init__(self, panels: DepthPanels, mu: Array):
+    def __init__(self, panels: DepthPanels, mu: Array, number: type = np.float64):
         self.panels = panels
-        self.mu = mu
-        self._up = np.flatnonzero(mu > 0)
-        self._down = np.flatnonzero(mu < 0)
-        widths = np.diff(panels.edges)
-        self._weights = {
-            sign: panel_weights(widths[::-sign], np.abs(mu[which]), panels.nodes.shape[1])
-            for sign, which in self._sides()
-        }
-
-    def _sides(self) -> tuple[tuple[int, NDArray[np.intp]], ...]:
-        return ((1, self._up), (-1, self._down))
+        self._order = np.concatenate([np.flatnonzero(mu > 0), np.flatnonzero(mu < 0)])
+        self._back = np.argsort(self._order)
+        above = int((mu > 0).sum())
+        self._sides: list[tuple[int, slice, Array]] = []
+        for sign, side in ((1, slice(0, above)), (-1, slice(above, mu.size))):
+            if side.start == side.stop:
+                continue
+            cosines = np.abs(mu[self._order[side]])
+            weights, fade = panel_weights(np.diff(panels.edges)[::-sign], cosines, panels.nodes.shape[1])
+            # Of the sources, and last of what enters a panel: (P, J, K + 1, K + 1)
+            both = np.moveaxis(np.concatenate([weights, fade[:, :, None]], axis=2), 3, 1)
+            self._sides.append((sign, side, np.ascontiguousarray(both.astype(number))))
 
     def __call__(self, source: Array) -> tuple[Array, Array]:
-        """Return the radiance of a source, at nodes and edges; no light enters from outside.
+        """Return the radiance of a source, at nodes and edges.
 
         `source`: (F, Z, J): F fields at the Z = P K nodes. Returns `nodes`, `edges`: (F, Z, J) and (F, P + 1, J).
         """
-        fields, _, streams = source.shape
-        panels, count = self.panels.nodes.shape
-        source = source.reshape(fields, panels, count, streams)
-        at_nodes = np.empty_like(source)
-        at_edges = np.zeros((fields, panels + 1, streams))
-        for sign, which in self._sides():
-            if not which.size:
-                continue
-            # Upward light runs through panels and nodes backwards; the nodes of a panel are symmetric.
-            along = slice(None, None, -sign)
-            weights, fade = self._weights[sign]
-            entering = source[:, along, along][..., which]
-            local = np.einsum("pkij,fpij->fpkj", weights, entering)
-            incoming = np.zeros((fields, panels + 1, which.size))
-            for panel in range(panels):
-                incoming[:, panel + 1] = incoming[:, panel] * fade[panel, -1] + local[:, panel, -1]
-            values = local[:, :, :-1] + incoming[:, :-1, None] * fade[:, :-1]
-            at_nodes[..., which] = values[:, along, along]
-            at_edges[..., which] = incoming[:, along]
-        return at_nodes.reshape(fields, panels * count, streams), at_edges
+        fields, depths, directions = source.shape
+        shape = *self.panels.nodes.shape, directions, fields
+        ordered = np.ascontiguousarray(source[..., self._order].transpose(1, 2, 0)).reshape(shape)
+        radiance, edges = self.sweep(ordered, range(len(self.panels.edges)), inside=True)
+        nodes = radiance.reshape(depths, directions, fields)
+        return nodes.transpose(2, 0, 1)[..., self._back], edges.transpose(2, 0, 1)[..., self._back]
+
+    def sweep(self, source: Array, places: Sequence[int], *, inside: bool) -> tuple[Array, Array]:
+        """Return the radiance of a source (P, K, J, F) at its nodes, and at edges, (D, J, F).
+
+        Directions are those that go up, and then the others. `inside` says whether the nodes are wanted.
+        """
+        panels, nodes, directions, count = source.shape
+        radiance = np.empty_like(source) if inside else source[:0]
+        wanted = np.zeros((len(places), directions, count), source.dtype)
+        for sign, side, weights in self._sides:
+            given = np.zeros((side.stop - side.start, nodes + 1, count), source.dtype)
+            result = np.empty_like(given)
+            for step in range(panels):
+                panel = panels - 1 - step if sign > 0 else step
+                # Upward light runs through the nodes backwards; the nodes of a panel are symmetric.
+                given[:, :nodes] = source[panel, ::-sign, side].transpose(1, 0, 2)
+                np.matmul(weights[step], given, out=result)
+                if inside:
+                    radiance[panel, ::-sign, side] = result[:, :nodes].transpose(1, 0, 2)
+                given[:, nodes] = result[:, nodes]
+                edge = panel if sign > 0 else panel + 1
+                for number, at in enumerate(places):
+                    if at == edge:
+                        wanted[number, side] = given[:, nodes]
+        return radiance, wanted
 
 
 def panel_weights(all_widths: Array, mu: Array, count: int) -> tuple[Array, Array]:

@@ -36,7 +36,6 @@ from realtime.methods.epipolar.samples import (
 )
 from realtime.methods.epipolar.slices import (
     Slices,
-    image_point,
     image_slices,
     neighbour,
     pixel_number,
@@ -135,7 +134,7 @@ class MinMax(Method):
         camera = view.camera
         cut = image_slices(camera, light, self.slices or _usual_slices(camera))
         heights = slice_heights(state.shadow_map, state.heights, cut, light)
-        point = image_point(camera, view.direction)
+        point = camera.project(view.direction)[:2]
         if self.sampling == "pixels":
             return airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
         depth = _depth_image(cut, point, view.distance)

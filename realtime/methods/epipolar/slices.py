@@ -96,14 +96,6 @@ def image_slices(camera: Camera, light: Light, count: int) -> Slices:
     return slices
 
 
-def image_point(camera: Camera, direction):
-    """Return (i, j) of rays along `direction` [pixels], to the left of and above the middle of the image."""
-    depth = dr.rcp(dr.dot(direction, camera.forward))
-    i = dr.dot(direction, camera.left) / dr.squared_norm(camera.left)
-    j = dr.dot(direction, camera.up) / dr.squared_norm(camera.up)
-    return i * depth, j * depth
-
-
 def pixel_number(slices: Slices, i, j):
     """Return the number, row times width plus column, of the pixel that holds a point (i, j), or of the nearest."""
     # The upper bounds are those of whole numbers: NaN becomes the largest of them.

@@ -71,9 +71,7 @@ class Grid:
     def place(self, point: Any) -> tuple[Any, Any, Any]:
         """Return u, v and the depth [m] of points [m]; u and v mean nothing where that is not above 0."""
         camera = self.camera
-        away = point - camera.origin
-        depth = dr.dot(away, camera.forward)
-        across, upward = (dr.dot(away, side) / (depth * dr.squared_norm(side)) for side in (camera.left, camera.up))
+        across, upward, depth = camera.project(point - camera.origin)
         return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
 
 

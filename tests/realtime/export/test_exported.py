@@ -12,7 +12,7 @@ import pytest
 
 import airlight
 from realtime.export.text import BUILT_IN, CONFORMING, kernel_text
-from realtime.kernels.exact import _DEPTH, exact
+from realtime.kernels.exact import PANEL_DEPTH, exact
 from realtime.kernels.quadrature import quadrature
 from realtime.methods.shader.client import ShaderHost
 from realtime.numerics.functions import unit_nodes
@@ -109,7 +109,7 @@ def test_constants_are_those_of_the_kernels(legacy):
         assert [np.float32(word) for word in words.split(", ")] == [np.float32(node[at]) for node in unit_nodes(8)]
     for width in HenyeyGreenstein.panels:
         assert f"widest = {width};" in code
-    assert f"width / {_DEPTH})" in code
+    assert f"width / {PANEL_DEPTH})" in code
 
 
 @pytest.mark.parametrize("language", ["glsl", "glsl es", "hlsl"])

@@ -58,7 +58,7 @@ def test_aim_is_kept_to_twice_the_digits(variant):
 
 @pytest.mark.parametrize("width", [1, 3, 641, 65535, 1 << 20, (1 << 31) - 1])
 def test_rows_and_columns_are_those_of_a_division(variant, width):
-    """Rationale: the division is a product with a rounded reciprocal, and wrong by one row where that does not do.
+    """Rationale: the division is one of float64, and wrong by one row where rounding shows.
 
     Setup: pixels next to the ends of rows, where it would show, up to the last that is allowed, and random ones.
     """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.methods.epipolar.min_max_tree import slice_heights
-from realtime.methods.epipolar.slices import image_point, image_slices, neighbour, pixel_number, slice_coordinate
+from realtime.methods.epipolar.slices import image_slices, neighbour, pixel_number, slice_coordinate
 from realtime.methods.epipolar.walk import sum_lit_intervals
 from realtime.rays import RayGeometry
 from realtime.scene.read_scene import read_scene
@@ -59,7 +59,7 @@ def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
     pixel = np.arange(SIZE[0] * SIZE[1])
     i, j = (SIZE[0] - 1) / 2 - pixel % SIZE[0], (SIZE[1] - 1) / 2 - pixel // SIZE[0]
     direction = camera.forward + camera.left * mi.Float(i) + camera.up * mi.Float(j)
-    point = image_point(camera, direction)
+    point = camera.project(direction)[:2]
     assert np.array(point[0]) == pytest.approx(i, abs=1e-4)
     assert np.array_equal(np.array(pixel_number(slices, *point)), pixel)
     number = neighbour(slices, mi.Int32(slice_coordinate(slices, *point) + 0.5))
