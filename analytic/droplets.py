@@ -37,19 +37,17 @@ left is p_cut/(1 - f), of mean 1, and, so that the same light is scattered elsew
 
     kappa' = (1 - albedo f) kappa,        albedo' = albedo (1 - f)/(1 - albedo f).
 
-The paper prints f = 0.5, "converted into 50 % lowered density", and a peak of 51 % of the energy. Here a cut to zero
-takes what lies below the angle, and `cut="flat"` leaves the value at 5 degrees there, which takes less.
-`share="matched"` lowers the density by what is cut; `share="printed"` lowers it by half whatever is cut.
+The paper prints f = 0.5, "converted into 50 % lowered density", and a peak of 51 % of the energy. Here nothing is left
+below the angle, and the density is lowered by what is cut.
 
 Light of order 1 must not lose its peak, nor count it twice: with kappa' and albedo' it takes the full phase function
 divided by 1 - f (the correction of Nakajima and Tanaka 1988, TMS), since albedo' kappa' p/(1 - f) = albedo kappa p.
 With kappa' and the albedo itself the divisor is 1 - albedo f.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -235,44 +233,16 @@ def optics(
 
 @dataclass(frozen=True)
 class Modified:
-    """The modified phase function: the forward peak cut, the density lowered."""
+    """The phase function without its forward peak, divided by what is left."""
 
     full: Optics
-    angle: float = 5.0  #: below which the peak is cut [degrees]
-    cut: str = "zero"  #: "zero": nothing is left below the angle; "flat": the value at the angle is
-    share: str = "matched"  #: "matched": the density is lowered by what is cut; "printed": by half
 
-    def __post_init__(self):
-        if not 0 < self.angle < 180:
-            raise InputError(f"the peak is cut below {self.angle} degrees; wanted an angle between 0 and 180")
-        if self.cut not in ("zero", "flat"):
-            raise InputError(f"the cut is '{self.cut}'; wanted 'zero' or 'flat'")
-        if self.share not in ("matched", "printed"):
-            raise InputError(f"the share is '{self.share}'; wanted 'matched' or 'printed'")
-
-    @property
-    def _flat(self) -> float:
-        return float(self.full(np.cos(np.deg2rad(self.angle)))) if self.cut == "flat" else 0.0
+    angle: ClassVar[float] = 5.0  #: below which nothing is left [degrees]
 
     @cached_property
     def removed(self) -> float:
-        """The share of the light that is cut out of the phase function [1]."""
-        return self.full.share(0, self.angle) - self._flat * 0.5 * (1 - np.cos(np.deg2rad(self.angle)))
-
-    @property
-    def lowered(self) -> float:
-        """Return by what share the density is lowered [1]."""
-        return self.removed if self.share == "matched" else 0.5
-
-    @property
-    def extinction(self) -> float:
-        """Return the lowered extinction [1/m]."""
-        return self.full.extinction * (1 - self.full.albedo * self.lowered)
-
-    @property
-    def albedo(self) -> float:
-        """Return the single-scattering albedo of what is left [1]."""
-        return self.full.albedo * (1 - self.lowered) / (1 - self.full.albedo * self.lowered)
+        """The share of the light that is cut out of the phase function, and by which the density is lowered [1]."""
+        return self.full.share(0, self.angle)
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
         """Return the phase function [1] at cosines of the scattering angle, of any shape; its mean is 1."""
@@ -282,42 +252,18 @@ class Modified:
     def from_half(self, down: Array, up: Array) -> Array:
         """Return the phase function [1] from sin^2 and cos^2 of half the scattering angle, arrays of one shape."""
         edge = np.sin(np.deg2rad(0.5 * self.angle)) ** 2
-        return np.where(down < edge, self._flat, self.full.from_half(down, up)) / (1 - self.removed)
-
-    def moments(self, count: int) -> Array:
-        """Return the first Legendre moments chi_l [1], (count,); they fall slowly, as the cut is sharp."""
-        return moments(self, count, breaks=(self.angle,), degree=len(self.full.chi))
-
-    @property
-    def g(self) -> float:
-        """Return the mean cosine of the scattering angle [1]."""
-        return float(self.moments(2)[1])
+        return np.where(down < edge, 0.0, self.full.from_half(down, up)) / (1 - self.removed)
 
 
-def moments(phase: Callable[[Array], Array], count: int, *, breaks: tuple[float, ...] = (), degree: int = 400) -> Array:
-    """Return the first Legendre moments chi_l = (1/2) int p P_l dcos of a phase function [1], (count,).
-
-    `phase`: takes cosines of the scattering angle; `count`: how many; `breaks`: angles at which it jumps or has a kink
-    [degrees]; `degree`: of a polynomial of the cosine that is as good as the function between the breaks.
-    """
-    edges = np.cos(np.deg2rad([180.0, *sorted(breaks, reverse=True), 0.0]))
-    nodes, weights = np.polynomial.legendre.leggauss((degree + count) // 2 + 1)
-    total = np.zeros(count)
-    for low, high in pairwise(edges):
-        cos_scatter = low + 0.5 * (high - low) * (nodes + 1)
-        total += 0.5 * (high - low) * _moments(cos_scatter, weights, phase(cos_scatter), count, norm=False)
-    return total
-
-
-def _moments(cos_scatter: Array, weights: Array, values: Array, count: int, *, norm: bool = True) -> Array:
-    """Return (1/2) sum weights values P_l for l < count, (count,), over that for l = 0 if `norm`."""
+def _moments(cos_scatter: Array, weights: Array, values: Array, count: int) -> Array:
+    """Return (1/2) sum weights values P_l for l < count over that for l = 0, (count,)."""
     weighted = 0.5 * weights * values
     before, last = np.zeros_like(cos_scatter), np.ones_like(cos_scatter)
     sums = np.empty(count)
     for order in range(count):
         sums[order] = weighted @ last
         before, last = last, ((2 * order + 1) * cos_scatter * last - order * before) / (order + 1)
-    return sums / sums[0] if norm else sums
+    return sums / sums[0]
 
 
 def _integral(phase: Optics, low: float, high: float) -> float:
