@@ -17,13 +17,11 @@ is even where E < d and logarithmic above. It takes both pairs of singularities,
 foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"), whose poles lie at +-i already, d is
 their width.
 
-In float32 every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, or four or
-eight nodes in x if it is short; they leave less than 1e-6. In float64 the numbers of nodes are the same for all, the
-smallest with which the certified cases and random rays of optical depth 1e-6 to 50, heights down to 1e-7 of the
-distance and |g| up to 0.95 stay below 1e-10; the isotropic case has no lobe, and pairs of nodes about the centre share
-their exponentials: it is `quadrature` with 40 nodes.
+Every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, in float32 four or
+eight nodes in x if it is short; they leave less than 1e-6. In float64 the same panels have 24 nodes: three times as
+many leave the third power of that.
 
-**Panels** of Gauss-Legendre nodes, for float32: every ray takes as many as its segment needs. The integral in v is
+**Panels** of Gauss-Legendre nodes: every ray takes as many as its segment needs. The integral in v is
 
     I = int_{v0}^{v1} exp(-a (E - E0)) P(E) d cosh v dv,     a = sigma_t h,     P = p/(1 + E^2).
 
@@ -78,7 +76,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.kernels.quadrature import path_interval, quadrature
+from realtime.kernels.quadrature import path_interval
 from realtime.numerics.array_types import is_single
 from realtime.numerics.functions import LOG2_E, exp2_bounded, exp_bounded, sinh_bounded, unit_nodes
 from realtime.rays import RayGeometry
@@ -161,7 +159,7 @@ def _half_angle(s, r, inverse, height_squared):
     return dr.select(behind, large, small), dr.select(behind, small, large)
 
 
-PANEL_NODES = 8  #: of a panel in float32
+PANEL_NODES, _NODES_DOUBLE = 8, 24  #: of a panel
 MOST_PANELS = 160  #: no segment needs as many, but a loop over values that are not numbers must end too
 PANEL_DEPTH = 10.5  #: T1
 _SOFT = 0.85  #: w for a light whose intensity falls off
@@ -169,12 +167,14 @@ _NO_RATE = 1e-30
 DEEPEST = 116.0  #: power of 2 beyond which nothing is left: e^-80
 
 
-def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None):
+def panels_mean(
+    phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None, *, nodes: int = PANEL_NODES
+):
     """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction [1].
 
-    `phase`: the phase function; `start`: (F, C), sinh and cosh of v0, float32; `scale`: d, see above; `width`: v1 - v0;
+    `phase`: the phase function; `start`: (F, C), sinh and cosh of v0; `scale`: d, see above; `width`: v1 - v0;
     0 where there is nothing to integrate; `decays`: a = sigma_t h, one or more; `weight`: relative intensity of the
-    light by E, or None where it is 1 everywhere.
+    light by E, or None where it is 1 everywhere; `nodes`: of a panel.
 
     Valid for any decay. The values are 0 where e^-80 is.
     """
@@ -184,13 +184,13 @@ def panels_mean(phase: Phase, start, scale, width, decays, weight: Callable[[Any
     count = panel_count(phase, width, largest * scale * c * width, soft=weight is not None)
     part_of_all = dr.rcp(dr.maximum(Float(count), 1))
     part = width * part_of_all
-    nodes = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(PANEL_NODES)]
+    offsets = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(nodes)]
     sinh_end, less_end = _offset(part)
     # Not 0 in a vacuum, where Dr.Jit would see a depth that no turn of the loop changes, and drop it from the state.
     rates = [dr.minimum(-decay * scale * LOG2_E, -_NO_RATE) for decay in decays]
 
     def panel(index, f, c, depths, totals):
-        for share, sinh, less in nodes:
+        for share, sinh, less in offsets:
             step = dr.fma(f, less, c * sinh)
             value = share * phase.density(f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
             if weight is not None:
@@ -229,13 +229,9 @@ def panel_count(phase: Phase, width, depth, *, soft: bool = False):
 
 def _offset(u):
     """Return sinh u and cosh u - 1."""
-    half = sinh_bounded(0.5 * u)
+    half = sinh_bounded(0.5 * u) if is_single(type(u)) else dr.sinh(0.5 * u)
     double = 2 * half
     return double * dr.sqrt(dr.fma(half, half, 1)), double * half
-
-
-#: In float64: nodes of the isotropic case, and of each panel of the others; the phase function says how many panels.
-_ISOTROPIC_DOUBLE, _NODES_DOUBLE = 40, 24
 
 
 def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
@@ -252,20 +248,17 @@ def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     spot's intensity falls off between beam and cut-off, the segment is cut into three; those that are empty cost
     nothing.
     """
-    if is_single(type(geometry.height)):
-        # The extinctions share their nodes.
-        values = _in_single(geometry, (x0, x1), medium.sigma_t, medium.phase, light)
-        J = values[0] if len(values) == 1 else type(medium.albedo)(*values)
-    else:
-        J = medium.per_extinction(lambda sigma_t: _in_double(geometry, (x0, x1), sigma_t, medium, light))
+    # The extinctions share their nodes.
+    J = medium.colour(_by_extinction(geometry, (x0, x1), medium.sigma_t, medium.phase, light))
     meets = (geometry.height == 0) & (x0 <= geometry.foot) & (geometry.foot <= x1) & (x0 < x1)
     return dr.select(meets, dr.inf, J)
 
 
-def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
+def _by_extinction(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
     """Return one value per extinction."""
     # Branches hand no derivatives on to what they see from outside. The rule for all segments needs none.
-    if light.varies or dr.grad_enabled(segment, (geometry.foot, geometry.height), extinctions, phase):
+    single = is_single(type(geometry.height))
+    if not single or light.varies or dr.grad_enabled(segment, (geometry.foot, geometry.height), extinctions, phase):
         return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
     segment_extent = extent(geometry, x0, x1, extinctions)
@@ -284,14 +277,6 @@ def _in_single(geometry: RayGeometry, segment, extinctions, phase: Phase, light:
         true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=FEW),
         false_fn=longer,
     )
-
-
-def _in_double(geometry: RayGeometry, segment, sigma_t, medium: Homogeneous, light: Light):
-    if medium.phase.constant and not light.varies:
-        x0, x1 = segment
-        grey = Homogeneous((sigma_t,), medium.albedo, medium.phase)
-        return quadrature(geometry, x0, x1, grey, light, nodes=_ISOTROPIC_DOUBLE)
-    return _over_subsegments(geometry, segment, (sigma_t,), medium.phase, light)[0]
 
 
 def _over_subsegments(geometry: RayGeometry, segment, extinctions, phase: Phase, light: Light):
@@ -313,42 +298,9 @@ def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light:
     def weight(e):
         return geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e)))
 
-    add_up = panels_mean if is_single(Float) else _double_mean
     decays = [sigma_t * h for sigma_t in extinctions]
-    means = add_up(phase, (f0, c0), scale, width, decays, weight if light.varies else None)
+    nodes = PANEL_NODES if is_single(Float) else _NODES_DOUBLE
+    means = panels_mean(phase, (f0, c0), scale, width, decays, weight if light.varies else None, nodes=nodes)
     r0 = dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h))
     shared = (width * scale) * (2 / h)
     return [mean * shared * dr.exp(-sigma_t * (x0 + r0)) for mean, sigma_t in zip(means, extinctions)]
-
-
-def _double_mean(phase: Phase, start, scale, width, decays, weight):
-    """Do what `panels_mean` does, in float64 and for one extinction: a loop over as many panels for all."""
-    Float = type(width)
-    f0, c0 = start
-    (decay,) = decays
-    count = phase.panels_double
-
-    def node(fraction):
-        grown = dr.exp(width * (0.5 * fraction))
-        shrunk = dr.rcp(grown)
-        sinh_half, cosh_half = 0.5 * (grown - shrunk), 0.5 * (grown + shrunk)
-        sinh, cosh_less = 2 * sinh_half * cosh_half, 2 * dr.square(sinh_half)
-        step = scale * dr.fma(f0, cosh_less, c0 * sinh)
-        e = scale * f0 + step
-        up = dr.rcp(dr.fma(e, e, 1))
-        lobe = dr.fma(c0, cosh_less, dr.fma(f0, sinh, c0)) * up * phase.evaluate_half(dr.square(e) * up, up)
-        value = dr.exp(-decay * step) * lobe
-        return value if weight is None else value * weight(e)
-
-    def panel(index, total):
-        start = Float(index)
-        part = sum(share * node((start + fraction) * (1 / count)) for fraction, share in unit_nodes(_NODES_DOUBLE))
-        return index + 1, total + part * (1 / count)
-
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), dr.zeros(Float, dr.width(width))),
-        cond=lambda index, total: index < count,
-        body=panel,
-        labels=("index", "total"),
-    )
-    return [total]

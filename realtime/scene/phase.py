@@ -41,8 +41,6 @@ class Phase:
     reach: ClassVar[Reach] = Reach()
     polynomial: ClassVar[tuple[float, ...] | None] = None  #: coefficients of ((1 + cos)/2)^0, ^1, ..., if it is one
     scale: ClassVar[float] = 1.0  #: d of `realtime.kernels.exact`: about the E = q/h at which the lobe ends
-    #: Panels of equal width in v that `realtime.kernels.exact` has in float64, however long the segment
-    panels_double: ClassVar[int] = 10
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value [1] from `down`, sin^2, and `up`, cos^2 of half the scattering angle, (1 -+ cos)/2.
@@ -344,7 +342,6 @@ class Mie(Phase):
 
     name = "mie"
     reach = Reach(few=0.01, more=0.04, turn=0.03)
-    panels_double = 40
 
     def panel_width(self, Float) -> Any:
         """Return the widest panel in v."""
