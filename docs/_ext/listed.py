@@ -2,7 +2,6 @@
 """Parts of pages that list what the program has: modules, names, commands, methods, kernels."""
 
 import inspect
-import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
@@ -11,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from reports.commands.list import list_
-from reports.data.reader import SCHEMA_FILE
+from reports.data import records
+from reports.data.reader import meanings
 from reports.tables.drawing import markdown
 from reports.tables.table import Name, Row, Table
 
@@ -178,12 +178,9 @@ def _command(words: Sequence[str], prose: str, usage: str, options: Sequence[tup
 
 
 def report_keys(*parts: str) -> str:
-    """Return tables of the keys of parts of `report.json`, or of the file itself, from its schema."""
-    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
+    """Return tables of the keys of parts of `report.json`, or of the file itself, from its records."""
     found = []
-    for part in parts or ("",):
-        shown = schema if not part else schema["$defs"].get(part) or schema["properties"][part]
-        keys = shown.get("items", shown)["properties"]
-        rows = [(f"`{name}`", each.get("description", "")) for name, each in keys.items()]
-        found.append((f"**{part}**\n\n" if part else "") + table(("key", "what it is"), rows, 2))
+    for part in parts or ("report",):
+        rows = [(f"`{name}`", what) for name, what in meanings(getattr(records, part.capitalize())).items()]
+        found.append((f"**{part}**\n\n" if parts else "") + table(("key", "what it is"), rows, 2))
     return "\n".join(found)

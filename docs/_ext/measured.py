@@ -2,7 +2,8 @@
 """Parts of pages that print what a report measured, from `docs/data/report.json`."""
 
 import json
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ from typing import Any
 from listed import table
 from shown import scene_picture
 
+from reports.data import records
+from reports.data.reader import record_of
 from reports.tables.agreement import left_out_table
 from reports.tables.drawing import markdown
 from reports.tables.kernels import cost_table
@@ -20,10 +23,33 @@ DATA = Path(__file__).resolve().parents[1] / "data"
 _METHOD = ("frame", "light_moved", "relative_rmse", "relative_bias", "p99", "max")
 
 
+@dataclass(frozen=True)
+class KeptScene:
+    """What the documentation keeps of a scene."""
+
+    name: str
+    size: records.Size
+    plan: Mapping[str, str]
+    counts: Mapping[str, int]
+    reference: records.Reference
+    multiple: records.Multiple
+    methods: tuple[records.MethodRow, ...]
+
+
 @cache
 def data() -> dict[str, Any]:
     """Return the numbers that the documentation keeps."""
     return json.loads((DATA / "report.json").read_text(encoding="utf-8"))
+
+
+@cache
+def kept_scenes() -> tuple[KeptScene, ...]:
+    """Return what is kept of every scene; what is not kept of a method or its errors is what it usually is."""
+    kept = data()["scenes"]
+    for entry in (entry for scene in kept for entry in scene["methods"]):
+        entry |= {"kind": "built-in", "layer": "airlight", "surface_error": None, "flip": None, "files": {}}
+        entry["error"] = entry["error"] and {"pixels": 0, "bias": None, "rmse": None} | entry["error"]
+    return tuple(record_of(scene, KeptScene) for scene in kept)
 
 
 def provenance() -> str:
@@ -31,7 +57,7 @@ def provenance() -> str:
     report = data()["report"]
     versions = report["versions"]
     command = report["command"].split(" -o ")[0]
-    sizes = dict.fromkeys("{} x {}".format(*scene["size"]) for scene in data()["scenes"])
+    sizes = dict.fromkeys("{} x {}".format(*scene.size) for scene in kept_scenes())
     timed = "{} x {}".format(*report["timed"])
     return (
         f"*Measured {report['created'][:10]} on {report['processor']}, {report['threads']} threads, "
@@ -50,22 +76,22 @@ def claims() -> str:
 
 def fastest() -> str:
     """Return which method is the fastest within an error, scene by scene."""
-    return markdown(replace(fastest_table(data()["scenes"], code=True), title=""))
+    return markdown(replace(fastest_table(kept_scenes(), code=True), title=""))
 
 
 def method(name: str) -> str:
     """Return a method's costs and errors in every scene."""
     rows, notes = [], []
-    for scene in data()["scenes"]:
-        for entry in scene["methods"]:
-            if entry["method"] != name:
+    for scene in kept_scenes():
+        for entry in scene.methods:
+            if entry.method != name:
                 continue
-            label = _inside(entry["label"])
-            if entry["refused"] or entry["error"] is None:
-                notes.append(f"- {scene['name']}, {label}: {entry['refused'] or entry['note'] or 'not measured'}")
+            label = _inside(entry.label)
+            if entry.refused or entry.error is None:
+                notes.append(f"- {scene.name}, {label}: {entry.refused or entry.note or 'not measured'}")
             else:
                 row = method_row(entry)
-                rows.append(Row(row.values | {"scene": Name(scene["name"]), "label": label}))
+                rows.append(Row(row.values | {"scene": Name(scene.name), "label": label}))
     if not rows:
         return f"The report at hand did not measure `{name}`."
     columns = (
@@ -102,38 +128,36 @@ def kernel_costs(phase: str) -> str:
 
 def left_out() -> str:
     """Return for every scene the fraction of light that single scattering leaves out."""
-    shares = left_out_table(data()["scenes"], code=True)
+    shares = left_out_table(kept_scenes(), code=True)
     keys = ("scene", "medium", "medium_interval", "everything", "everything_interval")
     return markdown(replace(shares.only(*keys), title=""))
 
 
-def _share(share: dict[str, Any]) -> str:
-    low, high = (100 * end for end in share["interval"])
-    return f"{100 * share['value']:.1f} % ({low:.1f}..{high:.1f})"
+def _share(share: records.Share) -> str:
+    low, high = (100 * end for end in share.interval)
+    return f"{100 * share.value:.1f} % ({low:.1f}..{high:.1f})"
 
 
 def scenes() -> str:
     """Return the gallery: every built-in scene with its picture, what it is for and what it holds."""
     from validation.scenes.registry import SCENES
 
-    kept = {scene["name"]: scene for scene in data()["scenes"]}
+    kept = {scene.name: scene for scene in kept_scenes()}
     return "\n".join(_scene(record, kept.get(name)) for name, record in SCENES.items())
 
 
-def _scene(record: Any, kept: dict[str, Any] | None) -> str:
+def _scene(record: Any, kept: KeptScene | None) -> str:
     words = [f"## `{record.name}`", "", scene_picture(record.name)]
     words += [record.purpose, "", f"- Published: {record.published}."]
     if kept:
-        count = kept["counts"]
-        lights = kept["plan"]["lights"]
+        count, lights = kept.counts, kept.plan["lights"]
         words.append(f"- {count['shapes']} shapes, {count['triangles']} triangles, lights: {lights}.")
-        words.append(f"- Medium: {kept['plan']['medium']}; extinction: {kept['plan']['extinction']}.")
-        truth = kept["reference"]
-        if truth["relative_bound"] is not None:
-            bound = number(truth["relative_bound"], 2)
-            words.append(f"- Reference: mean airlight {number(truth['mean'])} W/(m^2 sr), relative bound {bound}.")
-        if kept["multiple"]:
-            words.append(f"- Single scattering leaves out {_share(kept['multiple']['medium'])} of the airlight.")
+        words.append(f"- Medium: {kept.plan['medium']}; extinction: {kept.plan['extinction']}.")
+        reference = kept.reference
+        if reference.relative_bound is not None:
+            bound = number(reference.relative_bound, 2)
+            words.append(f"- Reference: mean airlight {number(reference.mean)} W/(m^2 sr), relative bound {bound}.")
+        words.append(f"- Single scattering leaves out {_share(kept.multiple.medium)} of the airlight.")
     return "\n".join([*words, ""])
 
 

@@ -8,6 +8,7 @@ It writes the table of the README and `docs/data/report.json`: `report` (when, b
 
 import argparse
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ def refresh(report: Path | None, kernels: Path | None) -> None:
     if DATA.exists():
         kept = _read_object(DATA, "the data of the documentation")
     if report is not None:
-        kept |= kept_of_report(read_report(report))
+        kept |= kept_of_report(asdict(read_report(report)))
     if kernels is not None:
         costs = _read_object(kernels, "what `airlight study kernels -o FILE.json` writes")
         kept["kernels"] = kept_of_kernels(costs, kernels)

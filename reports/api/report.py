@@ -7,7 +7,7 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -31,7 +31,9 @@ from reports.tables.record import Result, block, bullets
 from reports.tables.table import Table
 
 if TYPE_CHECKING:
+    from reports.data import records
     from reports.diff.compare import Difference
+    from validation.papers.claims import Judged
 
 FOLDER = "airlight-report"  #: where a report is written by default
 
@@ -41,7 +43,7 @@ class Report(Result):
     """An error report that was written."""
 
     folder: Path
-    data: Mapping[str, Any]  #: the content of report.json
+    data: "records.Report"  #: the content of report.json
     done: str = ""  #: how much was measured, in words
     figures: tuple[str, ...] = ()  #: files of figures that were written
 
@@ -53,42 +55,42 @@ class Report(Result):
     @property
     def claims(self) -> tuple[str, ...]:
         """The sentences at the top of the page."""
-        return tuple(claim["text"] for claim in self.data["claims"])
+        return tuple(claim.text for claim in self.data.claims)
 
     @property
     def confirmed(self) -> bool:
         """Whether no check speaks against the reference, and at least one confirms each layer."""
-        from reports.data.claims import confirmed
+        from reports.report.claims import confirmed
 
-        return confirmed(self.data["scenes"])
+        return confirmed(self.data.scenes)
 
     @property
     def faults(self) -> Sequence[str]:
         """What user methods did wrong."""
-        from reports.data.own_faults import own_faults
+        from reports.report.claims import own_faults
 
-        return own_faults(self.data)
+        return own_faults(row for scene in self.data.scenes for row in scene.methods)
 
     @property
     def passed(self) -> bool:
         """Whether the reference is confirmed and no user method is at fault."""
         return self.confirmed and not self.faults
 
-    def to_dict(self) -> Mapping[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the content of report.json."""
-        return self.data
+        return asdict(self.data)
 
     @property
     def tables(self) -> Sequence[Table]:
         """The fastest method within an error."""
         from reports.tables.methods import fastest_table
 
-        return [fastest_table(self.data["scenes"])] if self.data["scenes"] else []
+        return [fastest_table(self.data.scenes)] if self.data.scenes else []
 
     @property
     def lines(self) -> Sequence[str]:
         """Where it was written."""
-        count = len(self.data["scenes"])
+        count = len(self.data.scenes)
         page = f"{self.page}: {count} scene{'' if count == 1 else 's'}, {self.done}"
         return [page, *self.figures]
 
@@ -100,14 +102,14 @@ class Report(Result):
     @property
     def title(self) -> str:
         """The scenes and the date."""
-        return f"{', '.join(scene['name'] for scene in self.data['scenes'])}, {self.data['created']}"
+        return f"{', '.join(scene.name for scene in self.data.scenes)}, {self.data.created}"
 
     def _repr_html_(self) -> str:
         link = f'<p><a href="{_address(self.page)}">{self.page}</a></p>'
         return block(f"Report on {self.title}", bullets(self.claims), *map(html, self.tables), link)
 
     def __repr__(self) -> str:
-        return f"Report({str(self.folder)!r}, {len(self.data['scenes'])} scenes)"
+        return f"Report({str(self.folder)!r}, {len(self.data.scenes)} scenes)"
 
 
 def _address(page: Path) -> str:
@@ -210,14 +212,20 @@ def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) ->
 
 
 def _redrawn(path: Path, output: Any, figures: str | None, scenes: list[str], labels: list[str]) -> Report:
-    """Draw the page of a report again, and its figures."""
-    from reports.data.reader import load_report, redraw_report
+    """Draw the page of a report again, into its own folder or as a whole report into another, and its figures."""
+    from reference.storage.files import ensure_folder, write_bytes, write_text
+    from reports.data.reader import load_report, named_files
+    from reports.page.render import render_page
 
     if len(scenes) > 1:
         raise InputError("report: the strip shows one scene; name one of them")
     data, folder = load_report(path)
-    target = Path(output or folder)
-    redraw_report(data, folder, target)
+    target = ensure_folder(output or folder)
+    page = render_page(data, folder)
+    if not target.samefile(folder):
+        for name in ("report.json", *named_files(data)):
+            write_bytes(target / name, (folder / name).read_bytes())
+    write_text(target / "report.html", page)
     written = _figures(target, figures, scenes, labels) if figures else ()
     return Report(folder=target, data=data, done="drawn again", figures=written)
 
@@ -234,7 +242,7 @@ def _measured(
     fresh: bool,
     cluster: str | None,
     progress: Any,
-) -> dict[str, Any]:
+) -> "records.Report":
     """Measure and write a report; unusable input is refused before the work begins."""
     import gc
 
@@ -284,13 +292,13 @@ def _measured(
         )
 
 
-def _done(data: Mapping[str, Any]) -> str:
+def _done(report: "records.Report") -> str:
     """Say how long it took, and how much of it had been measured before."""
     from reports.page.filters import kept_words
 
-    kept = kept_words(data)
+    kept = kept_words(report)
     more = f"; {kept}; --fresh measures again" if kept else ""
-    return f"{data['computed']} results in {data['seconds']:.0f} s{more}"
+    return f"{report.computed} results in {report.seconds:.0f} s{more}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -359,7 +367,7 @@ def diff(
 class PaperClaims(Result):
     """The claims of papers with their verdicts."""
 
-    rows: tuple[Mapping[str, Any], ...]  #: as they stand under `papers` of report.json
+    rows: "tuple[Judged, ...]"  #: as they stand under `papers` of report.json
     left_out: int  #: claims that need images
     numbers: bool = False  #: whether numbers without a verdict are shown
     environment: Mapping[str, Any] | None = None
@@ -372,7 +380,7 @@ class PaperClaims(Result):
         """Return what `airlight paper --json` prints."""
         from validation.study.results import date
 
-        rows = list(self.rows)
+        rows = [asdict(row) for row in self.rows]
         return {"measured": date(), "environment": self.environment, "papers": rows, "left_out": self.left_out}
 
     @property
@@ -395,7 +403,7 @@ class PaperClaims(Result):
         """How many claims have each verdict."""
         from reports.tables.papers import count_words
 
-        return count_words([row for row in self.rows if row["verdict"] is not None])
+        return count_words([row for row in self.rows if row.verdict is not None])
 
 
 @one_error

@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""report.json read back, checked, and its page drawn again: without Mitsuba, and without measuring anything."""
+"""report.json as records and back, without Mitsuba, and without measuring anything."""
 
 import json
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path, PureWindowsPath
-from typing import Any
+from typing import Any, TypeVar
 
 from analytic.errors import InputError
+from reports.data import records
+from reports.data.records import SCHEMA, Report
 
-SCHEMA = "airlight-report/2"
-SCHEMA_FILE = Path(__file__).parent / "schema" / "report-2.json"
+Record = TypeVar("Record")
 
 
-def read_report(path: Path | str) -> dict[str, Any]:
+def read_report(path: Path | str) -> Report:
     """Read a report.json of the current schema, or that of a folder."""
     file = _report_file(path)
     data = read_json(file, f"what `airlight report -o {file.parent}` writes")
@@ -20,34 +23,51 @@ def read_report(path: Path | str) -> dict[str, Any]:
     if given != SCHEMA:
         got = f"the schema {given!r}" if given is not None else "no schema"
         raise InputError(f"{file} has {got}, wanted {SCHEMA!r}; make the report again with this version of airlight")
-    schema = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))
-    missing = [key for key in schema["required"] if key not in data]
-    fault = f"{missing[0]!r} is missing" if missing else _fault(data, schema)
-    if fault:
-        raise InputError(f"{file} does not keep to {SCHEMA}: {fault}; make the report again")
-    return data
+    from msgspec import ValidationError
+
+    try:
+        return record_of(data, Report)
+    except ValidationError as error:
+        words, _, place = str(error).partition(" - at `$")
+        where = f"report{place.rstrip('`')}"
+        raise InputError(f"{file} does not keep to {SCHEMA}: {where}: {words}; make the report again") from None
 
 
-def load_report(path: Path | str) -> tuple[dict[str, Any], Path]:
+def record_of(data: Any, kind: type[Record]) -> Record:
+    """Return what JSON holds as a record; keys that it does not know are passed over."""
+    import msgspec
+
+    return msgspec.convert(data, kind)
+
+
+def load_report(path: Path | str) -> tuple[Report, Path]:
     """Read a report, check that every file it names is there, and return it with the folder of the files."""
-    data, file = read_report(path), _report_file(path)
-    for name in named_files(data):
+    report, file = read_report(path), _report_file(path)
+    for name in named_files(report):
         # `C:name` is relative to the folder of another drive.
         if Path(name).is_absolute() or PureWindowsPath(name).drive or ".." in Path(name).parts:
             raise InputError(f"{file} names {name}, which is not in its folder; make the report again")
         if not (file.parent / name).is_file():
             raise InputError(f"{file} names {name}, which is not beside it; move a report with its whole folder")
-    return data, file.parent
+    return report, file.parent
 
 
 def read_json(path: Path, wanted: str) -> Any:
-    """Return what is in a JSON file; `wanted` says in words what it should be."""
+    """Return what is in a JSON file; `wanted` says in words what it should be.
+
+    A number that is not finite stays the word that stands there, so that no record takes it.
+    """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"), parse_float=_finite, parse_constant=_finite)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}; wanted {wanted}") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not valid JSON ({error}); wanted {wanted}") from error
+
+
+def _finite(digits: str) -> float | str:
+    value = float(digits)
+    return value if math.isfinite(value) else digits
 
 
 def _report_file(path: Path | str) -> Path:
@@ -56,41 +76,35 @@ def _report_file(path: Path | str) -> Path:
     return file if named else file / "report.json"
 
 
-def _fault(data: Any, schema: Mapping[str, Any]) -> str | None:
-    """Return the first fault of a report with its place; None without a fault."""
-    from jsonschema import Draft202012Validator
-    from jsonschema.exceptions import best_match
-
-    error = best_match(Draft202012Validator(schema).iter_errors(data))
-    if error is None:
-        return None
-    words = " ".join(error.message.split())
-    # The message begins with the offending value, which may be a whole scene.
-    return f"{error.json_path.replace('$', 'report', 1)}: {words if len(words) < 200 else f'.. {words[-160:]}'}"
-
-
-def report_text(data: Mapping[str, Any]) -> str:
+def report_text(report: Report) -> str:
     """Return the content of report.json."""
-    return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(asdict(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def redraw_report(data: Mapping[str, Any], folder: Path, target: Path) -> None:
-    """Draw the page of what `load_report` returned again, into its own folder or as a whole report into another."""
-    from reference.storage.files import ensure_folder, write_bytes, write_text
-    from reports.page.render import render_page
-
-    ensure_folder(target)
-    page = render_page(dict(data), folder)
-    if not target.samefile(folder):
-        for name in named_files(data):
-            write_bytes(target / name, (folder / name).read_bytes())
-        write_text(target / "report.json", report_text(data))
-    write_text(target / "report.html", page)
-
-
-def named_files(data: Mapping[str, Any]) -> Iterator[str]:
+def named_files(report: Report) -> Iterator[str]:
     """Yield the names of all files that a report consists of besides its page and its data."""
-    for scene in data["scenes"]:
-        yield from scene["files"].values()
-        for method in scene["methods"]:
-            yield from method["files"].values()
+    for scene in report.scenes:
+        yield from vars(scene.files).values()
+        for method in scene.methods:
+            yield from method.files.values()
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of report.json, with the meaning of each key."""
+    import msgspec
+
+    made = msgspec.json.schema(Report)
+    for name, shown in made["$defs"].items():
+        for key, meaning in meanings(getattr(records, name)).items():
+            shown["properties"][key] = {**shown["properties"][key], "description": meaning}
+    return made
+
+
+def meanings(record: type) -> dict[str, str]:
+    """Return what the keys of a record mean, with their units."""
+    assert is_dataclass(record)
+    return {each.name: _meaning(*each.metadata.get("column", ("", None, ""))) for each in fields(record)}
+
+
+def _meaning(heading: str, unit: str | None, meaning: str) -> str:
+    return f"{meaning} [{unit}]".strip() if unit else meaning

@@ -6,16 +6,18 @@ makes the comparison fail, and so does what disappeared: a method that is no lon
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from analytic.errors import InputError
-from reports.data.claims import confirmed
-from reports.diff.times import Finding, Report, TimeComparison, compare_times
+from reports.data.records import Errors, MethodRow, Report, Scene
+from reports.diff.times import Finding, TimeComparison, compare_times
+from reports.report.claims import confirmed
 from reports.tables.agreement import verdict
 from reports.tables.scaling import TIMES, WORK, same_records
 from reports.tables.table import Column, Table, table, words
+from validation.papers.claims import Judged
 from validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
@@ -63,7 +65,7 @@ def compare_reports(
     """
     if time_tolerance is not None and not 0 < time_tolerance < math.inf:
         raise InputError(f"--time-tolerance: got {time_tolerance:g}, wanted a number above 0, such as 0.1 for 10 %")
-    before, after = ({scene["name"]: scene for scene in report["scenes"]} for report in (old, new))
+    before, after = ({scene.name: scene for scene in report.scenes} for report in (old, new))
     findings: list[Finding] = []
     compared = 0
     for name in before:
@@ -90,10 +92,10 @@ def compare_reports(
 # Errors, scene by scene and method by method
 
 
-def _methods(old: Report, new: Report) -> tuple[list[Finding], int]:
+def _methods(old: Scene, new: Scene) -> tuple[list[Finding], int]:
     """Return the findings on the methods of a scene, and how many numbers were compared."""
-    name = old["name"]
-    before, after = ({entry["label"]: entry for entry in scene["methods"]} for scene in (old, new))
+    name = old.name
+    before, after = ({entry.label: entry for entry in scene.methods} for scene in (old, new))
     findings = [Finding("worse", name, label, "gone") for label in before if label not in after]
     findings += [Finding("note", name, label, "new") for label in after if label not in before]
     reason = _incomparable(old, new)
@@ -102,18 +104,20 @@ def _methods(old: Report, new: Report) -> tuple[list[Finding], int]:
     compared = 0
     for label in [label for label in before if label in after]:
         old_entry, new_entry = before[label], after[label]
-        if bool(old_entry["refused"]) != bool(new_entry["refused"]):
-            lost = new_entry["refused"]
+        if bool(old_entry.refused) != bool(new_entry.refused):
+            lost = new_entry.refused
             words = f"refused: {lost}" if lost else "no longer refused"
             # Leaving a method out for the time it takes is a decision of the user, not a fault.
-            decided = old_entry.get("left_out") or new_entry.get("left_out")
+            decided = old_entry.left_out or new_entry.left_out
             findings.append(Finding("note" if decided else "worse" if lost else "better", name, label, words))
-        elif old_entry.get("layer", "airlight") != new_entry.get("layer", "airlight"):
+        elif old_entry.layer != new_entry.layer:
             findings.append(Finding("note", name, label, "errors not compared: they are of different layers"))
         elif reason is None:
-            for layer, key in (("", "error"), ("surface ", "surface_error")):
-                noisy = key == "error" and bool(old_entry.get("noise") and new_entry.get("noise"))
-                was, is_now = (_of_runs(each) if noisy else each.get(key) for each in (old_entry, new_entry))
+            both, noisy = (old_entry, new_entry), bool(old_entry.noise and new_entry.noise)
+            for layer, (was, is_now) in (
+                ("", map(_of_runs if noisy else _of_image, both)),
+                ("surface ", (_numbers(each.surface_error) for each in both)),
+            ):
                 changes, count = _errors(was, is_now, prefix=layer)
                 findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
                 compared += count
@@ -123,37 +127,49 @@ def _methods(old: Report, new: Report) -> tuple[list[Finding], int]:
     return findings, compared
 
 
-def _incomparable(old: Report, new: Report) -> Finding | None:
+def _incomparable(old: Scene, new: Scene) -> Finding | None:
     """Say why the errors of a scene cannot be compared, None if they can."""
-    if old["size"] != new["size"]:
-        sizes = " and ".join("x".join(map(str, scene["size"])) for scene in (old, new))
-        return Finding("note", old["name"], "", f"errors not compared: the images are {sizes} pixels")
-    before, after = (scene["reference"]["mean"] for scene in (old, new))
+    if old.size != new.size:
+        sizes = " and ".join("x".join(map(str, scene.size)) for scene in (old, new))
+        return Finding("note", old.name, "", f"errors not compared: the images are {sizes} pixels")
+    before, after = (scene.reference.mean for scene in (old, new))
     if before is None or after is None:
         return None
     # Each bound limits the mean absolute error, so the means differ by at most the sum of both bounds.
-    bounds = sum(scene["reference"].get("relative_bound") or 0.0 for scene in (old, new))
+    bounds = sum(scene.reference.relative_bound or 0.0 for scene in (old, new))
     if abs(after - before) > (bounds + FLOORS["mean"]) * abs(before):
         words = (
             "the reference moved (mean radiance): another scene by this name, or another reference; errors not compared"
         )
-        return Finding("worse", old["name"], "", words, before, after)
+        return Finding("worse", old.name, "", words, before, after)
     return None
 
 
 Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
 
 
-def _of_runs(entry: Report) -> Report:
+Numbers = Mapping[str, Any]  #: of `Errors` by name, and `NAME_within`, half of the interval of a number
+
+
+def _numbers(errors: Errors | None) -> Numbers:
+    return asdict(errors) if errors else {}
+
+
+def _of_image(entry: MethodRow) -> Numbers:
+    return _numbers(entry.error)
+
+
+def _of_runs(entry: MethodRow) -> Numbers:
     """Return the errors of a method that draws random numbers: those of its runs, without quantiles of a single one."""
-    noise, error = entry["noise"], {name: entry["error"][name] for name in ("pixels", "nonfinite", "negative")}
-    of_runs = {f"relative_{name}": noise[name] for name in ("rmse", "bias", "rmse_within", "bias_within")}
-    return {**error, **of_runs}
+    assert entry.noise
+    noise, error = asdict(entry.noise), _numbers(entry.error)
+    kept = {name: error[name] for name in ("pixels", "nonfinite", "negative")}
+    return kept | {f"relative_{name}": noise[name] for name in ("rmse", "bias", "rmse_within", "bias_within")}
 
 
-def _errors(old: Report | None, new: Report | None, *, prefix: str) -> tuple[list[Change], int]:
+def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], int]:
     """Compare the errors of a configuration in one layer; what has an interval may differ by it too."""
-    if old is None or new is None:
+    if not old or not new:
         return ([("worse", f"{prefix}error is gone", None, None)] if old else []), 0
     changes: list[Change] = []
     for name in _ERRORS:
@@ -171,8 +187,8 @@ def _errors(old: Report | None, new: Report | None, *, prefix: str) -> tuple[lis
     return changes, len(_ERRORS)
 
 
-def _flip(old: Report, new: Report) -> tuple[list[Change], int]:
-    before, after = ((entry.get("flip") or {}).get("value") for entry in (old, new))
+def _flip(old: MethodRow, new: MethodRow) -> tuple[list[Change], int]:
+    before, after = (entry.flip.value if entry.flip else None for entry in (old, new))
     if before is None or after is None:
         return [], 0
     if abs(after - before) <= error_band("flip", before):
@@ -183,28 +199,28 @@ def _flip(old: Report, new: Report) -> tuple[list[Change], int]:
 # References, kernels that break, times that grow
 
 
-def _reference(old: Report, new: Report) -> Iterator[Finding]:
+def _reference(old: Scene, new: Scene) -> Iterator[Finding]:
     """Compare the reference of a scene in two reports."""
-    name = old["name"]
+    name = old.name
     if not confirmed([new]) and confirmed([old]):
         yield Finding("worse", name, "", "the reference is no longer confirmed")
     elif confirmed([new]) and not confirmed([old]):
         yield Finding("better", name, "", "the reference is confirmed now")
-    for key, agreement in old["agreement"].items():
-        if key not in new["agreement"]:
+    for key, agreement in old.agreement.items():
+        if key not in new.agreement:
             yield Finding("worse", name, "", f"the comparison with {key} is gone")
-        elif verdict(agreement) is True and verdict(new["agreement"][key]) is None:
+        elif verdict(agreement) is True and verdict(new.agreement[key]) is None:
             yield Finding("note", name, "", f"{key} ran out of time before it could confirm the reference")
-    if old["size"] == new["size"]:
+    if old.size == new.size:
         for key in ("disagreements", "left"):
-            before, after = old["reference"].get(key), new["reference"].get(key)
-            if before is not None and after is not None and after > before:
+            before, after = getattr(old.reference, key), getattr(new.reference, key)
+            if after > before:
                 yield Finding("worse", name, "", f"lit intervals of the reference: {key}", before, after)
 
 
 def _stability(old: Report, new: Report) -> Iterator[Finding]:
     """Compare which kernels break their bars."""
-    before, after = ({entry["kernel"]: entry["broken"] for entry in report["stability"]} for report in (old, new))
+    before, after = ({entry.kernel: entry.broken for entry in report.stability} for report in (old, new))
     for kernel in before:
         if kernel in after and after[kernel] and not before[kernel]:
             yield Finding("worse", "", kernel, f"breaks its bar: {after[kernel][0]}")
@@ -214,12 +230,12 @@ def _stability(old: Report, new: Report) -> Iterator[Finding]:
 
 def _growth(old: Report, new: Report) -> Iterator[Finding]:
     """Compare the powers of the work with which times grow."""
-    for before, after in same_records(old.get("scaling", ()), new.get("scaling", ())):
-        for name, growth in after["growth"].items():
-            if other_power(before["growth"][name], growth):
-                was, is_now = before["growth"][name]["exponent"], growth["exponent"]
-                what = f"the power of the {WORK[after['kind']]} with which {TIMES[name]} grows"
-                yield Finding("worse" if is_now > was else "better", after["scene"], after["label"], what, was, is_now)
+    for before, after in same_records(old.scaling, new.scaling):
+        for name, growth in after.growth.items():
+            if change := other_power(before.growth[name], growth):
+                was, is_now = before.growth[name].exponent, growth.exponent
+                what = f"the power of the {WORK[after.kind]} with which {TIMES[name]} grows"
+                yield Finding("worse" if change > 0 else "better", after.scene, after.label, what, was, is_now)
 
 
 # Claims of papers
@@ -227,7 +243,7 @@ def _growth(old: Report, new: Report) -> Iterator[Finding]:
 
 def _papers(old: Report, new: Report) -> Iterator[Finding]:
     """Compare which claims are reproduced."""
-    before, after = ({(row["paper"], row["item"]): row for row in report.get("papers", ())} for report in (old, new))
+    before, after = ({(row.paper, row.item): row for row in report.papers} for report in (old, new))
     if not before or not after:
         return
     for (paper, item), row in before.items():
@@ -235,18 +251,18 @@ def _papers(old: Report, new: Report) -> Iterator[Finding]:
         name = f"{paper}, {item}"
         if now is None:
             yield Finding("worse", "", "", f"{name}: the row is gone")
-        elif now["published"] != row["published"]:
-            yield Finding("worse", "", "", f"{name}: the published figure", row["published"], now["published"])
-        elif now["verdict"] != row["verdict"]:
-            what = f"{name}: {now['verdict']}, was {row['verdict']}"
-            yield Finding(_kind(row, now), "", "", what, row["measured"], now["measured"])
+        elif now.published != row.published:
+            yield Finding("worse", "", "", f"{name}: the published figure", row.published, now.published)
+        elif now.verdict != row.verdict:
+            what = f"{name}: {now.verdict}, was {row.verdict}"
+            yield Finding(_kind(row, now), "", "", what, row.measured, now.measured)
 
 
-def _kind(row: Report, now: Report) -> str:
-    if row["unit"] in _TIMED:
+def _kind(row: Judged, now: Judged) -> str:
+    if row.unit in _TIMED:
         return "note"
-    if "reproduced" in (row["verdict"], now["verdict"]):
-        return "worse" if row["verdict"] == "reproduced" else "better"
+    if "reproduced" in (row.verdict, now.verdict):
+        return "worse" if row.verdict == "reproduced" else "better"
     return "note"
 
 

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The times of two reports compared, by the rules of `validation.statistics.noise`."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
+from reports.data.records import Report, Size
 from validation.statistics.noise import SHORTEST, Times, drift, least_ratio, slower_stages, spread
-
-Report = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -44,9 +41,8 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeC
     notes = [Finding("note", "", "", change) for change in changes]
     if tolerance is None:
         return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0, tuple(notes))
-    kept = new.get("cached")
-    if kept:
-        notes.append(Finding("note", "", "", f"{kept} results of the new report were measured earlier and kept"))
+    if new.cached:
+        notes.append(Finding("note", "", "", f"{new.cached} results of the new report were measured earlier and kept"))
     pairs, otherwise = _pairs(old, new)
     notes += otherwise
     both = max(spread(_all_times(old)), spread(_all_times(new)))
@@ -60,15 +56,15 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeC
 
 def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:
     """Return whether both reports come from one machine, and what differs, in words."""
-    before, after = old["environment"], new["environment"]
-    changes = [f"{key}: {before.get(key)} -> {after.get(key)}" for key in _MACHINE if before.get(key) != after.get(key)]
-    same = not changes
-    versions = before.get("versions", {}), after.get("versions", {})
+    before, after = old.environment, new.environment
+    pairs = {key: (getattr(before, key), getattr(after, key)) for key in _MACHINE}
+    changes = [f"{key}: {was} -> {now}" for key, (was, now) in pairs.items() if was != now]
+    same, versions = not changes, (before.versions, after.versions)
     for name in sorted({*versions[0], *versions[1]}):
         old_version, new_version = (installed.get(name) for installed in versions)
         changes += [f"{name}: {old_version} -> {new_version}"] if old_version != new_version else []
-    if before.get("llvm") != after.get("llvm"):
-        changes.append(f"llvm: {before.get('llvm')} -> {after.get('llvm')}")
+    if before.llvm != after.llvm:
+        changes.append(f"llvm: {before.llvm} -> {after.llvm}")
     return same, tuple(changes)
 
 
@@ -83,7 +79,7 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
     for key in [key for key in before if key in after]:
         (size, note, old_times), (new_size, new_note, new_times) = before[key], after[key]
         if size != new_size:
-            sizes = " and ".join("x".join(map(str, pixels or ["?"])) for pixels in (size, new_size))
+            sizes = " and ".join("x".join(map(str, pixels)) for pixels in (size, new_size))
             notes[Finding("note", key[0], "", f"times not compared: the frames timed are {sizes} pixels")] = None
         elif note != new_note:
             notes[
@@ -94,23 +90,18 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
     return pairs, list(notes)
 
 
-def _timed(report: Report) -> dict[Key, tuple[Any, str | None, Times]]:
+def _timed(report: Report) -> dict[Key, tuple[Size, str | None, Times]]:
     """Return the size of the frames that were timed, the device or the note on how, and times, by scene and label."""
-    usual = report["settings"].get("timed")
     return {
-        (scene["name"], entry["label"]): (
-            scene.get("timed", usual),
-            entry.get("device") or entry.get("note"),
-            entry["times"],
-        )
-        for scene in report["scenes"]
-        for entry in scene["methods"]
-        if entry.get("times") and "frame" in entry["times"]
+        (scene.name, entry.label): (scene.timed, entry.device or entry.note, entry.times.stages)
+        for scene in report.scenes
+        for entry in scene.methods
+        if entry.times
     }
 
 
 def _all_times(report: Report) -> list[Times]:
-    return [entry["times"] for scene in report["scenes"] for entry in scene["methods"] if entry.get("times")]
+    return [times for _, _, times in _timed(report).values()]
 
 
 def _drift(common: float, least: float, machine: bool, count: int) -> list[Finding]:
@@ -131,7 +122,7 @@ def _configuration(
     moved = [("worse", stage) for stage in slower] + [("better", stage) for stage in faster]
     beside = "" if machine else f", beside the median of all ({common:.2f} times)"
     return [
-        Finding(verdict, scene, label, f"{stage} [ms]{beside}", old[stage]["median_ms"], new[stage]["median_ms"])
+        Finding(verdict, scene, label, f"{stage} [ms]{beside}", old[stage].median_ms, new[stage].median_ms)
         for verdict, stage in moved
-        if max(old[stage]["median_ms"], new[stage]["median_ms"]) >= SHORTEST
+        if max(old[stage].median_ms, new[stage].median_ms) >= SHORTEST
     ]

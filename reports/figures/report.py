@@ -4,7 +4,8 @@
 They are drawn from report.json and the EXR files beside it, without Mitsuba.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from reference.storage.exr import layer as image_layer
 from reference.storage.exr import read_exr
 from reference.storage.files import write_text
 from reports.data.reader import load_report
+from reports.data.records import MethodRow, Report, Scene
 from reports.plotting.figure import ENDINGS, new_figure, save_figure, show_picture, speed_panel
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS, report_styles
@@ -37,18 +39,18 @@ def write_figures(
 
     The strip shows `scene` and `labels`: by default the first scene with shadows and the most accurate of each method.
     """
-    data, place = load_report(folder)
+    report, place = load_report(folder)
     drawn: dict[str, Callable[[str], Any]] = {}
-    if any(_timed(each) for each in data["scenes"]):
-        drawn["frame-speed"] = partial(draw_speed, data["scenes"])
-    if scene or labels or any(_shown(each, name) for each in data["scenes"] for name in ("airlight", "total")):
-        drawn["strip"] = partial(draw_strip, *_strip(data, place, scene, labels))
+    if any(_timed(each) for each in report.scenes):
+        drawn["frame-speed"] = partial(draw_speed, report.scenes)
+    if scene or labels or any(_shown(each, name) for each in report.scenes for name in ("airlight", "total")):
+        drawn["strip"] = partial(draw_strip, *_strip(report, place, scene, labels))
     paths = [save_figure(folder / f"{name}{end}", draw, column) for name, draw in drawn.items() for end in ENDINGS]
-    write_text(folder / "methods-table.tex", latex_table(data["scenes"]))
+    write_text(folder / "methods-table.tex", latex_table(report.scenes))
     return tuple(str(path) for path in (*paths, folder / "methods-table.tex"))
 
 
-def latex_table(scenes: Sequence[Mapping[str, Any]]) -> str:
+def latex_table(scenes: Sequence[Scene]) -> str:
     """Return the LaTeX table of times and errors of every method in every scene."""
     comment = (
         "Times: medians with the distances to the quartiles, kernels compiled before.",
@@ -56,37 +58,38 @@ def latex_table(scenes: Sequence[Mapping[str, Any]]) -> str:
     )
     tables = []
     for scene in scenes:
-        bound = (scene["reference"] or {}).get("relative_bound")
+        bound = scene.reference.relative_bound
         known = f", reference known to {number(bound, 2, zeros=True)}" if bound else ""
-        about = "{} \N{MULTIPLICATION SIGN} {}".format(*scene["size"]) + known
-        rows = [_latex_row(entry) for entry in scene["methods"]]
-        tables.append(methods_table(scene["name"], rows, "label", *_TIMES, *_ERRORS, explanation=about))
+        about = "{} \N{MULTIPLICATION SIGN} {}".format(*scene.size) + known
+        rows = [_latex_row(entry) for entry in scene.methods]
+        tables.append(methods_table(scene.name, rows, "label", *_TIMES, *_ERRORS, explanation=about))
     return latex(tables, comment=comment)
 
 
-def _latex_row(entry: Mapping[str, Any]) -> Row:
-    if entry["refused"]:
-        return Row({"label": entry["label"]}, "refused")
+def _latex_row(entry: MethodRow) -> Row:
+    if entry.refused:
+        return Row({"label": entry.label}, "refused")
     keys = ("label", *_TIMES, *_ERRORS)
     values = {key: value for key, value in method_row(entry).values.items() if key in keys}
-    bad = (entry["error"] or {}).get("nonfinite")
-    remarks = [] if entry.get("layer", "airlight") == "airlight" else [entry["layer"]]
+    bad = entry.error.nonfinite if entry.error else 0
+    remarks = [] if entry.layer == "airlight" else [entry.layer]
     return Row(values, remarks=(*remarks, *([f"{bad:.0f} pixels not finite"] if bad else [])))
 
 
 # Time against error
 
 
-def _timed(scene: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    return [entry for entry in _measured(scene) if entry["times"]]
+def _timed(scene: Scene) -> list[MethodRow]:
+    return [entry for entry in _measured(scene) if entry.times]
 
 
-def draw_speed(scenes: Sequence[Mapping[str, Any]], column: str) -> Any:
+def draw_speed(scenes: Sequence[Scene], column: str) -> Any:
     """Return the time of a frame against the error of the airlight, a panel for each scene."""
-    timed = {scene["name"]: _timed(scene) for scene in scenes if _timed(scene)}
+    timed = {scene.name: _timed(scene) for scene in scenes if _timed(scene)}
     # Of all labels, also those without a point: variants are numbered as in the report, so that its page agrees.
-    there = {entry["label"] for entries in timed.values() for entry in entries}
-    styles = {label: style for label, style in report_styles(scenes).items() if label in there}
+    there = {entry.label for entries in timed.values() for entry in entries}
+    rows = (row for scene in scenes for row in scene.methods)
+    styles = {label: style for label, style in report_styles(rows).items() if label in there}
     width, double = WIDTHS[column], column == "double"
     across = min(len(timed), 3 if double else 1)
     down = -(-len(timed) // across)
@@ -106,39 +109,39 @@ def draw_speed(scenes: Sequence[Mapping[str, Any]], column: str) -> Any:
 # Images with insets: the two squares in which the methods are wrong the most
 
 
-def _measured(scene: Mapping[str, Any], layer: str = "airlight") -> Iterator[Mapping[str, Any]]:
+def _measured(scene: Scene, layer: str = "airlight") -> Iterator[MethodRow]:
     """Yield the methods of a scene that were not refused and whose error is of a layer."""
-    for entry in scene["methods"]:
-        if not entry["refused"] and entry["error"] and entry.get("layer", "airlight") == layer:
+    for entry in scene.methods:
+        if not entry.refused and entry.error and entry.layer == layer:
             yield entry
 
 
-def _strip(data: Mapping[str, Any], place: Path, name: str | None, labels: Sequence[str] | None) -> tuple[Any, ...]:
+def _strip(report: Report, place: Path, name: str | None, labels: Sequence[str] | None) -> tuple[Any, ...]:
     """Return the scene, the methods to show, and the images of the reference and of each."""
-    scene = _scene(data, name)
+    scene = _scene(report, name)
     chosen = _chosen(scene, labels)
-    layer = chosen[0].get("layer", "airlight")
-    return scene["name"], chosen, [_pixels(place / each["files"]["exr"], layer) for each in (scene, *chosen)]
+    files = [scene.files.exr, *(each.files["exr"] for each in chosen)]
+    return scene.name, chosen, [_pixels(place / file, chosen[0].layer) for file in files]
 
 
-def _scene(data: Mapping[str, Any], name: str | None) -> Mapping[str, Any]:
-    scenes = {scene["name"]: scene for scene in data["scenes"] if _shown(scene, "airlight") or _shown(scene, "total")}
+def _scene(report: Report, name: str | None) -> Scene:
+    scenes = {scene.name: scene for scene in report.scenes if _shown(scene, "airlight") or _shown(scene, "total")}
     if name is not None and name not in scenes:
         raise InputError(f"scene: got {name!r}, wanted one of {', '.join(scenes)}" + nearest(name, scenes))
     if not scenes:
         raise InputError("the report has no scene with an image of a method: nothing to show")
-    shadowed = [scene for scene in scenes.values() if not str(scene["plan"].get("shadows", "none")).startswith("none")]
+    shadowed = [scene for scene in scenes.values() if not scene.plan.get("shadows", "none").startswith("none")]
     return scenes[name] if name else (shadowed or list(scenes.values()))[0]
 
 
-def _chosen(scene: Mapping[str, Any], wanted: Sequence[str] | None) -> list[Mapping[str, Any]]:
+def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[MethodRow]:
     """Return the methods to show: those that were asked for, or the most accurate of each."""
-    known = {entry["label"]: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)}
+    known = {entry.label: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)}
     if wanted is None:
-        best: dict[str, Mapping[str, Any]] = {}
+        best: dict[str, MethodRow] = {}
         for entry in _shown(scene, "airlight") or _shown(scene, "total"):
-            if entry["method"] not in best or _rank(entry) < _rank(best[entry["method"]]):
-                best[entry["method"]] = entry
+            if entry.method not in best or _rank(entry) < _rank(best[entry.method]):
+                best[entry.method] = entry
         kept = sorted(best.values(), key=_rank)[:_MOST]
         return [entry for entry in best.values() if entry in kept]
     for label in wanted:
@@ -146,19 +149,24 @@ def _chosen(scene: Mapping[str, Any], wanted: Sequence[str] | None) -> list[Mapp
             names = "; ".join(known)
             raise InputError(f"method: got {label!r}, wanted some of {names}" + nearest(label, known))
     chosen = [known[label] for label in wanted]
-    if len({entry.get("layer", "airlight") for entry in chosen}) > 1:
+    if len({entry.layer for entry in chosen}) > 1:
         raise InputError("method: got images with airlight and images without layers; show them in two figures")
     return chosen
 
 
-def _shown(scene: Mapping[str, Any], layer: str) -> list[Mapping[str, Any]]:
+def _shown(scene: Scene, layer: str) -> list[MethodRow]:
     """Return the methods of a scene that have an image."""
-    return [entry for entry in _measured(scene, layer) if entry["files"].get("exr")]
+    return [entry for entry in _measured(scene, layer) if "exr" in entry.files]
 
 
-def _rank(entry: Mapping[str, Any]) -> float:
-    error = entry["error"]["relative_rmse"]
-    return float("inf") if error is None or entry["error"]["nonfinite"] else error
+def _rank(entry: MethodRow) -> float:
+    rmse = _rmse(entry)
+    return math.inf if math.isnan(rmse) or (entry.error and entry.error.nonfinite) else rmse
+
+
+def _rmse(entry: MethodRow) -> float:
+    rmse = None if entry.error is None else entry.error.relative_rmse
+    return math.nan if rmse is None else rmse
 
 
 def _pixels(path: Path, name: str) -> Any:
@@ -185,7 +193,7 @@ def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ..
     return tuple(corners)
 
 
-def draw_strip(scene: str, methods: Sequence[Mapping[str, Any]], images: Sequence[Any], column: str) -> Any:
+def draw_strip(scene: str, methods: Sequence[MethodRow], images: Sequence[Any], column: str) -> Any:
     """Return reference and methods in one exposure, two insets of each, and the signed relative error."""
     height, width = images[0].shape[:2]
     side = max(4, min(height, width) // _INSET)
@@ -210,13 +218,13 @@ def draw_strip(scene: str, methods: Sequence[Mapping[str, Any]], images: Sequenc
     return figure
 
 
-def _words(entry: Mapping[str, Any] | None, scene: str) -> str:
+def _words(entry: MethodRow | None, scene: str) -> str:
     """Return a label, broken before its parameters, with the error and the time."""
     if entry is None:
         return f"reference\n\n{scene}"
-    name, _, rest = entry["label"].partition(" (")
-    time = f", {number(entry['times']['frame']['median_ms'])} ms" if entry["times"] else ""
-    return "\n".join((name, rest.rstrip(")"), f"RMSE {entry['error']['relative_rmse']:.1e}{time}"))
+    name, _, rest = entry.label.partition(" (")
+    time = f", {number(entry.times.frame.median_ms)} ms" if entry.times else ""
+    return "\n".join((name, rest.rstrip(")"), f"RMSE {_rmse(entry):.1e}{time}"))
 
 
 def _show(panel: Any, picture: Any, title: str = "", size: float = 6, frame: str | None = None) -> None:

@@ -3,18 +3,20 @@
 
 import io
 import re
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+from reports.data.records import Scene
 from reports.plotting.figure import new_figure, short, speed_panel
 from reports.plotting.style import report_styles
 
 _SIZE = {"markersize": 7}
 
 
-def speed_error_chart(scenes: list[dict[str, Any]]) -> str:
+def speed_error_chart(scenes: Sequence[Scene]) -> str:
     """Return speed against error as inline SVG: one panel a scene, one colour and marker a configuration everywhere."""
-    styles = {label: style | _SIZE for label, style in report_styles(scenes).items()}
+    styles = _styles(scenes)
     columns = min(2, len(scenes))
     rows = -(-len(scenes) // columns)
     figure = new_figure(5.1 * columns, 3.3 * rows + 0.9)
@@ -27,27 +29,29 @@ def speed_error_chart(scenes: list[dict[str, Any]]) -> str:
     return svg_text(figure)
 
 
-def scene_chart(scenes: list[dict[str, Any]], place: int) -> str:
+def scene_chart(scenes: Sequence[Scene], place: int) -> str:
     """Return speed against error in one of the scenes as inline SVG, in the styles of the whole report.
 
     The point of the n-th method that has images has the name "point-n", and says what it is under the pointer.
     """
-    styles, scene = {label: style | _SIZE for label, style in report_styles(scenes).items()}, scenes[place]
+    styles, scene = _styles(scenes), scenes[place]
     figure = new_figure(5.2, 3.0)
     panel = figure.subplots()
     points = _panel(panel, scene, styles)
     titles = {}
-    for number, entry in enumerate(entry for entry in scene["methods"] if entry["files"]):
-        if entry["label"] in points:
+    for number, entry in enumerate(entry for entry in scene.methods if entry.files):
+        if entry.label in points:
             name = f"point-{number}"
-            points[entry["label"]].set_gid(name)
-            time, error = entry["times"]["frame"]["median_ms"], entry["error"]["relative_rmse"]
-            titles[name] = escape(f"{entry['label']}: {time:.3g} ms, relative RMSE {error:.2g}")
+            points[entry.label].set_gid(name)
+            assert entry.times
+            assert entry.error
+            time, error = entry.times.frame.median_ms, entry.error.relative_rmse
+            titles[name] = escape(f"{entry.label}: {time:.3g} ms, relative RMSE {error:.2g}")
     # The first variant of a method stands for all: the strip of the errors beside the chart names every one.
     methods: dict[str, Any] = {}
-    for entry in scene["methods"]:
-        if entry["label"] in points:
-            methods.setdefault(entry["method"], styles[entry["label"]])
+    for entry in scene.methods:
+        if entry.label in points:
+            methods.setdefault(entry.method, styles[entry.label])
     _legend(figure, panel, methods, columns=4)
     svg = svg_text(figure, "airlight, one scene")
     for name, words in titles.items():
@@ -55,13 +59,18 @@ def scene_chart(scenes: list[dict[str, Any]], place: int) -> str:
     return svg
 
 
+def _styles(scenes: Sequence[Scene]) -> dict[str, dict[str, Any]]:
+    rows = (row for scene in scenes for row in scene.methods)
+    return {label: style | _SIZE for label, style in report_styles(rows).items()}
+
+
 def _legend(figure: Any, panel: Any, styles: dict[str, dict[str, Any]], *, columns: int) -> None:
     handles = [panel.plot([], [], **style, linestyle="none", label=short(label))[0] for label, style in styles.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
 
 
-def _panel(panel: Any, scene: dict[str, Any], styles: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    points = speed_panel(panel, scene["name"], scene["methods"], styles)
+def _panel(panel: Any, scene: Scene, styles: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    points = speed_panel(panel, scene.name, scene.methods, styles)
     panel.set_ylabel("relative RMSE of the airlight [1]")
     panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
     return points

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from reports.data.records import Report
 from reports.tables.drawing import DASH, sentence_in_html, typeset
 from reports.tables.table import number as plain_number
 
@@ -39,6 +40,8 @@ def words(value: Any) -> str:
         return DASH
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:g}"
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {words(entry)}" for key, entry in value.items())
     if isinstance(value, list | tuple):
@@ -64,13 +67,12 @@ def with_code(text: str) -> str:
     return Markup(sentence_in_html(text))
 
 
-def kept_words(data: Mapping[str, Any]) -> str:
+def kept_words(report: Report) -> str:
     """Return how many results of a report are cached from earlier runs; empty where none was."""
-    kept, computed = data.get("cached") or 0, data.get("computed")
-    if not kept:
+    if not report.cached:
         return ""
-    of = f" of {kept + computed}" if computed is not None else ""
-    return f"{kept}{of} results are cached from earlier runs on this machine with the same code"
+    whole = report.cached + report.computed
+    return f"{report.cached} of {whole} results are cached from earlier runs on this machine with the same code"
 
 
 def viewer_words(index: Mapping[str, Any]) -> str:

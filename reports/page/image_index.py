@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import TOTAL, read_exr
+from reports.data.records import Scene
 from reports.page.image_codec import (
     DIFFERENCE_BITS,
     FLIP_BITS,
@@ -47,7 +48,7 @@ class SceneImages:
     data: str  #: all packed planes, in base64
 
 
-def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -> list[SceneImages]:
+def page_images(scenes: Sequence[Scene], folder: Path, limit: int) -> list[SceneImages]:
     """Return the images of scenes of report.json from a folder, all together in at most `limit` characters.
 
     Every scene begins with all pixels; while the page is too large the largest goes down `STRIDES`.
@@ -66,10 +67,10 @@ def page_images(scenes: Sequence[Mapping[str, Any]], folder: Path, limit: int) -
     return packed
 
 
-def read_images(scene: Mapping[str, Any], folder: Path) -> list[dict[str, Array]]:
+def read_images(scene: Scene, folder: Path) -> list[dict[str, Array]]:
     """Return the layers of the files of a scene of report.json: of the reference, then of each method with images."""
-    reference = _layers(folder / scene["files"]["exr"])
-    files = [folder / entry["files"]["exr"] for entry in scene["methods"] if entry["files"]]
+    reference = _layers(folder / scene.files.exr)
+    files = [folder / entry.files["exr"] for entry in scene.methods if entry.files]
     methods = [_layers(path) for path in files]  # not in parallel: reading turns the standard error stream off
     size = reference["airlight"].shape
     for path, layers in zip(files, methods):
@@ -89,7 +90,7 @@ def _layers(path: Path) -> dict[str, Array]:
     return {name: np.asarray(layers[name], dtype=np.float64) for name in wanted if name in layers}
 
 
-def packed_scene(scene: Mapping[str, Any], folder: Path, stride: int) -> SceneImages:
+def packed_scene(scene: Scene, folder: Path, stride: int) -> SceneImages:
     """Return the images of a scene of report.json for the page: one pixel in `stride` along both axes."""
 
     def thin(layers: Mapping[str, Array]) -> dict[str, Array]:
@@ -112,7 +113,7 @@ def packed_scene(scene: Mapping[str, Any], folder: Path, stride: int) -> SceneIm
     exact[TOTAL] = exact["airlight"] + exact["surface"]
     rounded = {name: reference_values(codes[name]) for name in LAYERS}
     rounded[TOTAL] = rounded["airlight"] + rounded["surface"]
-    shown = [entry for entry in scene["methods"] if entry["files"]]
+    shown = [entry for entry in scene.methods if entry.files]
 
     def packed(number: int) -> dict[str, bytes]:
         """Return the packed layers of a method."""
@@ -132,16 +133,16 @@ def packed_scene(scene: Mapping[str, Any], folder: Path, stride: int) -> SceneIm
     height, width = codes["airlight"].shape[:2]
     full_height, full_width = reference["airlight"].shape[:2]
     index = {
-        "name": scene["name"],
+        "name": scene.name,
         "size": [width, height],
         "full": [full_width, full_height],
         "stride": stride,
-        "exposure": scene["exposure"],
+        "exposure": scene.exposure,
         "floors": floors,
         "scale": [K, S],
         "reference": {name: add(plane) for name, plane in zip(LAYERS, references)},
         "methods": [
-            {"label": entry["label"], "layers": {name: add(what) for name, what in layers.items()}}
+            {"label": entry.label, "layers": {name: add(what) for name, what in layers.items()}}
             for entry, layers in zip(shown, methods)
         ],
     }

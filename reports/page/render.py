@@ -7,11 +7,12 @@ data (`reports.page.image_index`), decoded and drawn by the scripts in `template
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
+from reports.data.records import Method, Report, Scene
 from reports.page.chart import scene_chart, speed_error_chart
 from reports.page.filters import FILTERS, KINDS, MARKS, kept_words, viewer_words
 from reports.page.image_index import SceneImages, page_images
@@ -28,16 +29,16 @@ SCRIPTS = ("codec.js", "scene.js", "draw.js", "viewer.js", "page.js")
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) -> str:
+def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str:
     """Return the HTML page of a report whose files lie in a folder; images are thinned out to keep the limit."""
     from markupsafe import Markup
 
     # A scene without any image has no viewer.
-    with_images = [scene for scene in data["scenes"] if any(entry["files"] for entry in scene["methods"])]
+    with_images = [scene for scene in report.scenes if any(entry.files for entry in scene.methods)]
     images = page_images(with_images, Path(folder), limit - WORDS_LIMIT)
     number_of = {id(scene): number for number, scene in enumerate(with_images)}
-    lead = _lead(data["scenes"], [place for place, scene in enumerate(data["scenes"]) if id(scene) in number_of])
-    chart = "" if lead is None else Markup(scene_chart(data["scenes"], lead))
+    lead = _lead(report.scenes, [place for place, scene in enumerate(report.scenes) if id(scene) in number_of])
+    chart = "" if lead is None else Markup(scene_chart(report.scenes, lead))
     viewers = [
         _viewer(
             scene,
@@ -48,21 +49,21 @@ def render_page(data: dict[str, Any], folder: Path, *, limit: int = PAGE_LIMIT) 
         )
         if id(scene) in number_of
         else None
-        for place, scene in enumerate(data["scenes"])
+        for place, scene in enumerate(report.scenes)
     ]
     environment = page_environment()
     environment.globals |= TABLES
     page = environment.get_template("report.html.j2").render(
-        report=data,
+        report=report,
         viewers=viewers,
         lead=lead,
-        trust=trust_words(data["scenes"]),
-        chart=Markup(speed_error_chart(data["scenes"])) if data["scenes"] else "",
+        trust=trust_words(report.scenes),
+        chart=Markup(speed_error_chart(report.scenes)) if report.scenes else "",
         css=template_text("report.css"),
         scripts=[template_text(name) for name in SCRIPTS],
         images=Markup(_script_json({"scenes": [scene_images.index for scene_images in images], "maps": _maps()})),
         pixels=[Markup(scene_images.data) for scene_images in images],
-        kept=kept_words(data),
+        kept=kept_words(report),
     )
     if len(page.encode()) > limit:
         raise InputError(
@@ -95,14 +96,12 @@ def template_text(name: str) -> "Markup":
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
-def _viewer(
-    scene: Mapping[str, Any], number: int, images: SceneImages, *, chart: str, folder: Path | None
-) -> dict[str, Any]:
+def _viewer(scene: Scene, number: int, images: SceneImages, *, chart: str, folder: Path | None) -> dict[str, Any]:
     """Return what the viewer of a scene shows; with a folder also its first pictures, which need no script."""
-    shown = [entry for entry in scene["methods"] if entry["files"]]
+    shown = [entry for entry in scene.methods if entry.files]
     first = _first_shown(shown)
-    files = {"reference": scene["files"], "method": shown[first]["files"], "error": {}}
-    named = {name: of.get("picture") for name, of in files.items()} | {"error": shown[first]["files"].get("error")}
+    files = shown[first].files
+    named = {"reference": scene.files.picture, "method": files.get("picture"), "error": files.get("error")}
     return {
         "number": number,
         "shown": shown,
@@ -135,19 +134,19 @@ def _inline(path: Path) -> str:
     return f"data:image/webp;base64,{base64.b64encode(buffer.getvalue()).decode()}"
 
 
-def _lead(scenes: Sequence[Mapping[str, Any]], shown: Sequence[int]) -> int | None:
+def _lead(scenes: Sequence[Scene], shown: Sequence[int]) -> int | None:
     """Return the place of the scene that opens the page: with the most edges between light and shadow; None for none.
 
     Of equals the first; `shown` are the places of the scenes that have images.
     """
-    return max(shown, key=lambda place: scenes[place]["reference"]["transitions"] or 0, default=None)
+    return max(shown, key=lambda place: scenes[place].reference.transitions, default=None)
 
 
-def _first_shown(methods: Sequence[Mapping[str, Any]]) -> int:
+def _first_shown(methods: Sequence[Method]) -> int:
     """Return the place of the method of median error: the error map of an exact method is white."""
 
     def error(place: int) -> float:
-        rmse = (methods[place]["error"] or {}).get("relative_rmse")
+        rmse = getattr(methods[place].error, "relative_rmse", None)
         return float("inf") if rmse is None else rmse
 
     ranked = sorted((place for place in range(len(methods)) if error(place) < float("inf")), key=error)

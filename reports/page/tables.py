@@ -2,9 +2,10 @@
 """The tables of the page, from the data of a report."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
+from reports.data.records import MethodRow, Scene
 from reports.page.filters import MARKS, words
 from reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
 from reports.tables.drawing import html
@@ -14,43 +15,42 @@ from reports.tables.papers import paper_tables
 from reports.tables.scaling import scaling_tables
 from reports.tables.table import Column, Row, Table, table
 
-Data = Mapping[str, Any]
-
 _METHODS = (
     *("label", "frame", "frame_rate", "airlight", "surface", "light_moved", "objects_moved"),
     *("relative_rmse", "relative_bias", "p50", "p99", "flip", "nonfinite"),
 )
 
 
-def methods(scene: Data, timed: Sequence[int]) -> Table:
+def methods(scene: Scene) -> Table:
     """Return what the methods of a scene cost and how wrong they are."""
-    shadows = scene["plan"]["shadows"].startswith("vis")
+    shadows = scene.plan["shadows"].startswith("vis")
 
-    def row(entry: Data) -> Row:
+    def row(entry: MethodRow) -> Row:
         made, peer = method_row(entry, shadows=shadows), published_as(entry)
         return replace(made, remarks=(*made.remarks, f"published peer, {peer}")) if peer else made
 
     explanation = (
-        f"Times at {words(timed)} pixels, medians, below those of a frame their quartiles; errors at "
-        f"{words(scene['size'])} pixels, of the airlight against the reference, or of all light where an image has no "
+        f"Times at {words(scene.timed)} pixels, medians, below those of a frame their quartiles; errors at "
+        f"{words(scene.size)} pixels, of the airlight against the reference, or of all light where an image has no "
         "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away. "
         "Published peers, at the end, are papers as printed: their errors are theirs."
     )
-    rows = map(row, sorted(scene["methods"], key=lambda entry: bool(published_as(entry))))
-    return methods_table(
-        f"Times and errors of the methods in {scene['name']}", rows, *_METHODS, explanation=explanation
+    rows = map(row, sorted(scene.methods, key=lambda entry: bool(published_as(entry))))
+    return methods_table(f"Times and errors of the methods in {scene.name}", rows, *_METHODS, explanation=explanation)
+
+
+def facts(title: str, entries: Any) -> Table:
+    """Return what is known by name, of a mapping or a record."""
+    known = entries if isinstance(entries, Mapping) else asdict(entries)
+    columns = (Column("name", "", words=True), Column("value", "", words=True, long=True))
+    return table(
+        title, columns, [(key.replace("_", " "), words(value)) for key, value in known.items() if value is not None]
     )
 
 
-def facts(title: str, entries: Data) -> Table:
-    """Return what is known by name."""
-    columns = (Column("name", "", words=True), Column("value", "", words=True, long=True))
-    return table(title, columns, [(key.replace("_", " "), words(value)) for key, value in entries.items()])
-
-
-def trust_words(scenes: Sequence[Data]) -> dict[str, str]:
+def trust_words(scenes: Sequence[Scene]) -> dict[str, str]:
     """Return in few words, after a mark, whether the reference is confirmed."""
-    verdicts = [verdict(entry) for scene in scenes for entry in scene["agreement"].values()]
+    verdicts = [verdict(entry) for scene in scenes for entry in scene.agreement.values()]
     if not verdicts:
         return {"mark": MARKS[None][0], "words": "Reference not compared"}
     against, agree = verdicts.count(False), verdicts.count(True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reference.storage.files import write_bytes
+from reports.data.records import MethodRow
 from reports.plotting.style import WIDTHS, figure_style
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def show_picture(panel: "Axes", picture: Any, title: str = "", size: float = 6) 
 
 
 def speed_panel(
-    panel: "Axes", title: str, entries: Iterable[Mapping[str, Any]], styles: Mapping[str, Mapping[str, Any]]
+    panel: "Axes", title: str, entries: Iterable[MethodRow], styles: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label.
 
@@ -85,16 +86,16 @@ def speed_panel(
     """
     points = {}
     for entry in entries:
-        frame, error = (entry["times"] or {}).get("frame"), (entry["error"] or {}).get("relative_rmse")
+        frame, error = entry.times and entry.times.frame, entry.error and entry.error.relative_rmse
         if frame and error:  # an error of 0 has no place on a logarithmic axis
-            middle = frame["median_ms"]
-            spread = [[middle - frame["low_ms"]], [frame["high_ms"] - middle]]
-            style = {**styles[entry["label"]], "linestyle": "none"}
-            if noise := entry.get("noise"):
-                error = noise["rmse"]
-                bias = noise["most_bias"] if noise["root_bias"] is None else noise["root_bias"]
+            middle = frame.median_ms
+            spread = [[middle - frame.low_ms], [frame.high_ms - middle]]
+            style = {**styles[entry.label], "linestyle": "none"}
+            if noise := entry.noise:
+                error = noise.rmse
+                bias = noise.most_bias if noise.root_bias is None else noise.root_bias
                 style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
-            points[entry["label"]] = panel.errorbar([middle], [error], xerr=spread, **style).lines[0]
+            points[entry.label] = panel.errorbar([middle], [error], xerr=spread, **style).lines[0]
     panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
     panel.set_title(title, parse_math=False)  # a dollar in a file name must not begin a formula
     plain_times(panel)

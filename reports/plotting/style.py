@@ -11,7 +11,7 @@ Nothing heavy is imported at the top, and nothing is set: `figure_style` changes
 
 import itertools
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -95,18 +95,15 @@ def reference_style() -> dict[str, Any]:
     return {"color": "black", "linestyle": "-", "linewidth": 1.3}
 
 
-def report_styles(scenes: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+def report_styles(rows: Iterable[Any]) -> dict[str, dict[str, Any]]:
     """Return the marker style of every label of a report, the same in its page and in all figures made from it.
 
-    Variants of a method are numbered in the order in which the scenes name them. Of methods that are not built in the
-    first two have styles of their own, and those after them begin again.
+    Rows have a `method` and a `label`. Variants of a method are numbered in the order in which they come. Of methods
+    that are not built in the first two have styles of their own, and those after them begin again.
     """
-    variants: dict[str, list[str]] = {}
-    for scene in scenes:
-        for entry in scene["methods"]:
-            labels = variants.setdefault(entry["method"], [])
-            if entry["label"] not in labels:
-                labels.append(entry["label"])
+    variants: dict[str, dict[str, None]] = {}
+    for row in rows:
+        variants.setdefault(row.method, {})[row.label] = None
     others = [method for method in variants if method not in _METHODS]
     styles = {}
     for method, labels in variants.items():

@@ -4,7 +4,8 @@
 Read in this order:
 
 - `asked.py`: the scenes and images that a report is asked for
-- `scene.py`: what report.json says of a scene, and its files
+- `scene.py`: the record of a scene, and its files
 - `others.py`: what belongs to no scene: stability, growth, claims of papers
+- `claims.py`: the sentences at the top, from the numbers, and what user methods did wrong
 - `measure.py`: all of these, report.json and the page, in a folder out of sight until it is whole
 """

@@ -21,15 +21,15 @@ from realtime.errors import InputError as MethodError
 from realtime.methods.shader.source import is_shader
 from reference.storage.files import NO_SPACE, ensure_folder
 from reference.storage.kept import fresh_results
-from reports.data.claims import claims, growth_claims, unstudied
-from reports.data.own_faults import own_fault
-from reports.data.reader import SCHEMA, report_text
+from reports.data.reader import record_of, report_text
+from reports.data.records import SCHEMA, Environment, Kernel, Measured, Report, Settings
 from reports.machine.environment import describe_environment, machine, threads
 from reports.machine.opengl import require_opengl
 from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Progress, part_of
 from reports.page.render import render_page
-from reports.report.others import other_parts, paper_rows, shares
+from reports.report.claims import claims, growth_claims, own_fault, unstudied
+from reports.report.others import other_parts, paper_rows, scaling_records, shares
 from reports.report.scene import folder_of, write_scene
 from validation.scenes.loading import scene_stem
 from validation.scenes.random.design import is_random
@@ -60,7 +60,7 @@ def write_report(
     progress: Progress | None = None,
     noted: Callable[[Sequence[str]], None] = lambda notes: None,
     cluster: "Client | None" = None,
-) -> dict[str, Any]:
+) -> Report:
     """Study scenes and write the report into a folder; return the content of report.json, see docs/formats.md.
 
     Of the sizes and media of the study the first alone counts. `images` from elsewhere are judged, by scene, at their
@@ -121,57 +121,51 @@ def write_report(
                 found = part.result(part_of(progress, *span, before=f"{part.title}, "))
             by_kind.setdefault(part.kind, []).append(found)
             results.append(found)
-        scaling = [record for found in by_kind.get("scaling", ()) for record in found.data["scaling"]]
+        scaling = [each for found in by_kind.get("scaling", ()) for each in scaling_records(found.data["scaling"])]
         usual = study.name in STUDIES and names == standard_study(study.name).scenes
-        data = {
-            "schema": SCHEMA,
-            "created": date(),
-            "command": command,
-            "seconds": round(time.monotonic() - start, 1),
-            "parts": seconds,
-            **_counts(results),
-            "settings": settings(study),
-            "environment": environment,
-            "claims": claims(studied) + growth_claims(scaling) + (unstudied(names, list(FOG_SCENES)) if usual else []),
-            "scenes": studied,
-            "stability": next((found.data["kernels"] for found in by_kind.get("stability", ())), []),
-            "scaling": scaling,
-            "papers": paper_rows(by_kind.get("papers", ())),
-        }
+        kernels = [each for found in by_kind.get("stability", ()) for each in found.data["kernels"]]
+        kept, made = sum(result.cached for result in results), sorted(result.made for result in results)
+        report = Report(
+            schema=SCHEMA,
+            created=date(),
+            command=command,
+            seconds=round(time.monotonic() - start, 1),
+            parts=seconds,
+            cached=kept,
+            computed=len(results) - kept,
+            measured=Measured(first=date(made[0]), last=date(made[-1])) if made else None,
+            settings=settings(study),
+            environment=record_of(environment, Environment),
+            claims=(*claims(studied), *growth_claims(scaling), *(unstudied(names, list(FOG_SCENES)) if usual else [])),
+            scenes=tuple(studied),
+            stability=tuple(record_of(each, Kernel) for each in kernels),
+            scaling=tuple(scaling),
+            papers=tuple(paper_rows(by_kind.get("papers", ()))),
+        )
         page = part_of(progress, *spans[-1])
         page(0.0, "the page")
-        write_page(data, images=hidden, folder=hidden)
+        (hidden / "report.json").write_text(report_text(report), encoding="utf-8", newline="\n")
+        (hidden / "report.html").write_text(render_page(report, hidden), encoding="utf-8", newline="\n")
     page(1.0, "done")
-    return data
+    return report
 
 
-def write_page(data: Mapping[str, Any], *, images: Path, folder: Path) -> None:
-    """Write report.json and the page that is made from it and from the files it names, which lie in `images`."""
-    (folder / "report.json").write_text(report_text(data), encoding="utf-8", newline="\n")
-    (folder / "report.html").write_text(render_page(dict(data), images), encoding="utf-8", newline="\n")
-
-
-def settings(study: Study) -> dict[str, Any]:
-    """Return what a study asked for, ready for JSON."""
+def settings(study: Study) -> Settings:
+    """Return what a study asked for."""
     measure, checks = study.measure, study.checks
-    return {
+    asked = {
+        **{name: getattr(checks, name) for name in ("margins", "samples", "batches", "multiple", "patience")},
+        **{name: getattr(measure, name) for name in ("seconds", "slow", "limit")},
         "name": study.name,
-        "scenes": list(study.scene_names()),
-        "image": list(study.sizes[0]),
-        "timed": list(measure.timed_size or study.sizes[0]),
-        "checked": list(checks.size),
-        "margins": dict(checks.margins),
-        "samples": dict(checks.samples),
-        "batches": checks.batches,
-        "multiple": list(checks.multiple),
-        "patience": checks.patience,
-        "seconds": measure.seconds,
-        "slow": measure.slow,
-        "limit": measure.limit,
+        "scenes": tuple(study.scene_names()),
+        "image": study.sizes[0],
+        "timed": measure.timed_size or study.sizes[0],
+        "checked": checks.size,
         "flip": study.flip,
         "rays": study.stability,
-        "scaling": list(study.growth),
+        "scaling": study.growth,
     }
+    return record_of(asked, Settings)
 
 
 @contextmanager
@@ -197,14 +191,6 @@ def _picture(study: SceneStudy, size: tuple[int, int]) -> "Picture":
 
     name = study.path
     return Picture(name if name in SCENES or is_random(name) else str(Path(name).resolve()), size)
-
-
-def _counts(results: Sequence[Result]) -> dict[str, Any]:
-    """Return how many results were kept, how many computed, and when the first and the last of all."""
-    kept = sum(result.cached for result in results)
-    made = sorted(result.made for result in results)
-    measured = {"first": date(made[0]), "last": date(made[-1])} if made else None
-    return {"cached": kept, "computed": len(results) - kept, "measured": measured}
 
 
 def _try_own(study: SceneStudy, apart: Apart | None) -> dict[Configuration, str]:

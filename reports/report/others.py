@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from reference.storage.kept import is_kept, key_of
+from reports.data.reader import record_of
+from reports.data.records import Scaling
 from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from validation.metrics.errors import plain
-from validation.papers.claims import EFFORTS, Claim, claims, experiments, judged
+from validation.papers.claims import EFFORTS, Claim, Judged, claims, experiments, judged
 from validation.study.results import Computed, Result, cached_result
 from validation.study.study import Study, standard_study
 
@@ -98,16 +100,18 @@ def _scaling(kind: str, seconds: float) -> OtherPart:
     def compute(progress: Progress) -> Computed:
         steps = ladder(kind, _GROWING, _GROWING_SIZE)
         found = study_scaling(kind, steps, METHODS, seconds=seconds, progress=counted(progress))
-        return {"scaling": [scaling_data(_GROWING, _GROWING_SIZE, each) for each in found]}, {}
+        return {"scaling": found}, {}
 
     identity = {"scene": _GROWING, "size": _GROWING_SIZE, "kind": kind, "seconds": seconds}
-    key = key_of("report-scaling", study_scaling, ladder, scaling_data, machine=machine(), **identity)
+    key = key_of("report-scaling", study_scaling, ladder, machine=machine(), **identity)
     return OtherPart("scaling", "how times grow", key, _GROWTH, compute)
 
 
-def scaling_data(name: str, size: tuple[int, int], found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return how a method grows with one kind of work, in a scene with images of a size [pixels]."""
-    return {"scene": Path(name).stem, "size": list(size), **found}
+def scaling_records(
+    found: Sequence[Mapping[str, Any]], name: str = _GROWING, size: tuple[int, int] = _GROWING_SIZE
+) -> list[Scaling]:
+    """Return how methods grow with one kind of work, in a scene with images of a size [pixels]."""
+    return [record_of({"scene": Path(name).stem, "size": size, **each}, Scaling) for each in found]
 
 
 # --- claims of papers ------------------------------------------------------------------------------------------------
@@ -132,14 +136,14 @@ def _paper(name: str) -> OtherPart:
     return OtherPart("papers", name, key, experiment.seconds, compute)
 
 
-def paper_rows(results: Sequence[Result]) -> list[dict[str, Any]]:
+def paper_rows(results: Sequence[Result]) -> list[Judged]:
     """Return the claims that the results of experiments decide."""
     found = {result.data["experiment"]: result.data["figures"] for result in results}
     return decided(claims(), found) if found else []
 
 
-def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return the claims whose experiments were made, and those that no experiment can measure, ready for JSON."""
+def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[Judged]:
+    """Return the claims whose experiments were made, and those that no experiment can measure."""
     return [
         judged(claim, figures.get(claim.experiment, {}))
         for claim in chosen
@@ -147,9 +151,7 @@ def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -
     ]
 
 
-def measure_claims(
-    chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None
-) -> list[dict[str, Any]]:
+def measure_claims(chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None) -> list[Judged]:
     """Measure what claims need and is not cached, and return those that are decided; `quick` leaves out images."""
     parts = {name: _paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])}
     steps = shares({name: part.seconds for name, part in parts.items()})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What report.json says of one scene, and its files: an EXR and pictures of the reference and of every row."""
+"""The record of one scene of a report, and its files: an EXR and pictures of the reference and of every row."""
 
 import json
 import re
@@ -12,6 +12,8 @@ import numpy as np
 from realtime.scene.features import describe
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import Image, write_exr
+from reports.data.reader import record_of
+from reports.data.records import Method, MethodRow, Reference, Scene
 from reports.machine.environment import stamped
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from validation.estimates.images import layered_reference
@@ -23,15 +25,9 @@ from validation.study.scene import Judged, SceneResult
 SUFFIXES = {"exr": ".exr", "picture": ".png", "airlight": "-airlight.png", "error": "-error.png"}
 _REFERENCE = "reference"  # the stem of the reference's files
 
-#: What report.json has of a row.
-_ENTRY = (
-    *("label", "kind", "layer", "pixel", "method", "kernel", "knows_shadows", "status", "note", "device", "times"),
-    *("memory", "cost", "error", "noise", "surface_error", "flip"),
-)
 
-
-def write_scene(result: SceneResult, folder: Path) -> dict[str, Any]:
-    """Return what report.json says of a scene, and write its files into a folder of the report's."""
+def write_scene(result: SceneResult, folder: Path) -> Scene:
+    """Return the record of a scene, and write its files into a folder of the report's."""
     study, reference = result.study, result.reference
     files = _Files(folder, folder_of(study.path))
     light = reference.airlight + reference.surface
@@ -39,58 +35,55 @@ def write_scene(result: SceneResult, folder: Path) -> dict[str, Any]:
     pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(reference.airlight, factor)}
     named = files.written(_REFERENCE, layered_reference(study.name, reference), pictures)
     stems = file_stems([judged.row["label"] for judged in result.rows])
-    size = list(study.size)
-    return {
+    made = {
         "name": study.name,
         "purpose": study.loaded.purpose,
         "published": study.loaded.published,
         "path": str(study.loaded.path) if study.loaded.path else None,
-        "size": size,
-        "timed": list(study.study.measure.timed_size or size),
+        "size": study.size,
+        "timed": study.study.measure.timed_size or study.size,
         "plan": describe(study.scene.features),
-        "notes": list(study.scene.features.notes),
-        "reference": reference_data(reference),
+        "notes": study.scene.features.notes,
+        "reference": reference_record(reference),
         "exposure": factor,
         "agreement": result.agreement,
         "multiple": result.multiple,
         "files": named,
         "methods": [_entry(judged, files, stem, factor) for judged, stem in zip(result.rows, stems, strict=True)],
-        "seconds": dict(result.seconds),
+        "seconds": result.seconds,
     }
+    return record_of(made, Scene)
 
 
-def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> dict[str, Any]:
-    """Return what report.json says of a row, with its files written."""
+def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> Method:
+    """Return the record of a row, with its files written."""
     row, named = judged.row, dict[str, str]()
     if judged.image is not None and judged.expected is not None:
         test = np.asarray(judged.image.layers[row["layer"]], dtype=np.float64)
         pictures = {"picture": tone_mapped(judged.light, factor), "error": error_map(judged.expected, test)}
         named = files.written(stem, judged.image, pictures)
-    return row_entry(row) | {
-        "files": named,
-        "measured": judged.results[0].measured,
-        "seconds": round(sum(result.seconds for result in judged.results), 3),
-        "cached": all(result.cached for result in judged.results),
-    }
+    return Method(
+        **vars(row_record(row, named)),
+        measured=judged.results[0].measured,
+        seconds=round(sum(result.seconds for result in judged.results), 3),
+        cached=all(result.cached for result in judged.results),
+    )
 
 
-def row_entry(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what report.json says of a row, without its files."""
-    return {name: row[name] for name in _ENTRY} | {
-        "parameters": json.loads(row["parameters"]),
-        "refused": row["reason"],
-        "left_out": row["status"] == "left out",
-        "files": {},
-    }
+def row_record(row: Mapping[str, Any], files: Mapping[str, str]) -> MethodRow:
+    """Return the record of a `Row`, as JSON has it, with the names of its files."""
+    more = {"refused": row["reason"], "left_out": row["status"] == "left out", "files": files}
+    return record_of({**row, "parameters": json.loads(row["parameters"]), **more}, MethodRow)
 
 
-def reference_data(reference: ReferenceImage) -> dict[str, Any]:
+def reference_record(reference: ReferenceImage) -> Reference:
     """Return what the quadrature reference says of its errors, without its images."""
     finite = np.isfinite(reference.airlight)
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
     bound = float(reference.airlight_bound[finite].mean()) / mean if mean > 0 else None
-    return plain({"mean": mean, "relative_bound": bound} | {name: getattr(reference, name) for name in numbers})
+    found = plain({"mean": mean, "relative_bound": bound} | {name: getattr(reference, name) for name in numbers})
+    return record_of(found, Reference)
 
 
 class _Files:

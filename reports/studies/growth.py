@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from typing import Any
 
@@ -65,7 +65,7 @@ def scaling(
 
     activate()
     from reports.api.render import asked_configurations
-    from reports.report.others import scaling_data
+    from reports.report.others import scaling_records
     from reports.tables.scaling import cliffs, scaling_tables
     from validation.study.growth import METHODS, study_scaling
 
@@ -74,28 +74,28 @@ def scaling(
     assert pixels is not None
     # Scenes that have nothing of a kind are refused before an hour of work, not after.
     ladders = [(name, kind, ladder(kind, name, pixels)) for name in names for kind in wanted]
-    records: list[dict[str, Any]] = []
+    records: list[Any] = []
     with telling(progress, "scaling") as tell:
         for at, (name, kind, steps) in enumerate(ladders):
             part = part_of(tell, at / len(ladders), (at + 1) / len(ladders))
             found = study_scaling(kind, steps, chosen, progress=counted(part))
-            records += [scaling_data(name, pixels, each) for each in found]
+            records += scaling_records(found, name, pixels)
     return Study(
         name="scaling",
-        data=with_environment(scaling=records),
+        data=with_environment(scaling=[asdict(each) for each in records]),
         drawn=tuple(scaling_tables(records)),
         wrong=tuple(cliffs(records)),
         draw=partial(_draw_scaling, records),
     )
 
 
-def _draw_scaling(records: list[dict[str, Any]], column: str) -> Any:
+def _draw_scaling(records: list[Any], column: str) -> Any:
     """Return the time of a frame over its work, by kind of work, with the fitted exponents and the camera rays."""
     from reports.plotting.figure import new_figure
     from reports.plotting.style import WIDTHS, method_style
     from reports.tables.scaling import WORK
 
-    kinds = list(dict.fromkeys(record["kind"] for record in records))
+    kinds = list(dict.fromkeys(record.kind for record in records))
     width, double = WIDTHS[column], column == "double"
     across = min(len(kinds), 2 if double else 1)
     down = -(-len(kinds) // across)
@@ -103,13 +103,13 @@ def _draw_scaling(records: list[dict[str, Any]], column: str) -> Any:
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for panel, kind in zip(panels, kinds):
         costs: list[Any] = []
-        for record in (each for each in records if each["kind"] == kind):
-            costs = record["costs"]
-            label = f"{record['label']}: power {record['growth']['frame']['exponent'] or math.nan:.2f}"
-            times = [cost["frame"]["median_ms"] for cost in costs]
-            panel.plot([cost["work"] for cost in costs], times, label=label, **method_style(record["label"].split()[0]))
-        rays = [cost["rays"]["median_ms"] for cost in costs]
-        panel.plot([cost["work"] for cost in costs], rays, color="0.6", linestyle=":", label="camera rays")
+        for record in (each for each in records if each.kind == kind):
+            costs = record.costs
+            label = f"{record.label}: power {record.growth['frame'].exponent or math.nan:.2f}"
+            times = [cost.frame.median_ms for cost in costs]
+            panel.plot([cost.work for cost in costs], times, label=label, **method_style(record.label.split()[0]))
+        rays = [cost.rays.median_ms for cost in costs]
+        panel.plot([cost.work for cost in costs], rays, color="0.6", linestyle=":", label="camera rays")
         panel.set(xscale="log", yscale="log", xlabel=f"{WORK[kind]} [1]", ylabel="time of a frame [ms]")
         panel.legend(loc="best")
     for panel in panels[len(kinds) :]:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from analytic.errors import InputError
 from reports.api.inputs import File, KernelLike, Kernels, Progress, kernel_name, one_error, several, telling
+from reports.data.reader import record_of
+from reports.data.records import Kernel
 from reports.machine.progress import counted
 from reports.studies.result import Study, with_environment
 from reports.tables.kernels import kernel_tables, stability_summary
@@ -133,7 +135,7 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     return Study(
         name="stability",
         data=with_environment(**data),
-        drawn=(stability_summary(data["kernels"]),),
+        drawn=(stability_summary(record_of(one, Kernel) for one in data["kernels"]),),
         said=tuple(line for one in data["kernels"] for line in _stability_lines(one)),
         good=not any(one["broken"] for one in data["kernels"]),
     )

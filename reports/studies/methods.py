@@ -3,6 +3,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 from functools import cache, partial
 from typing import Any
 
@@ -109,26 +110,27 @@ def methods(
 
     activate()
     from reports.api.render import asked_configurations
-    from reports.data.own_faults import own_faults
+    from reports.report.claims import own_faults
     from reports.tables.methods import methods_table
 
     chosen, apart = asked_configurations(method, kernel, settings)
     loaded = _scenes(scenes, size)
     _check_work("methods", loaded, chosen, progress=progress)
-    benched, rows = [], []
+    benched, tables, wrong, rows = [], [], [], []
     with telling(progress, "methods") as tell:
         for at, scene in enumerate(loaded):
             step = part_of(tell, at / len(loaded), (at + 1) / len(loaded))
-            data, of_scene = _methods_in(scene, chosen, seconds=seconds, apart=apart, progress=step)
-            benched.append(data)
+            records, of_scene = _methods_in(scene, chosen, seconds=seconds, apart=apart, progress=step)
+            benched.append({"name": scene.name, "size": [*scene.size], "methods": [asdict(each) for each in records]})
+            tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), records))
+            wrong += own_faults(records)
             rows += of_scene
-    tables = [methods_table("{}, {} x {}".format(each["name"], *each["size"]), each["methods"]) for each in benched]
     return MethodsStudy(
         name="methods",
         data=with_environment(scenes=benched),
         drawn=tuple(tables),
         rows=tuple(rows),
-        wrong=tuple(own_faults({"scenes": benched})),
+        wrong=tuple(dict.fromkeys(wrong)),
     )
 
 
@@ -154,11 +156,11 @@ def _methods_in(
     seconds: float,
     apart: bool,
     progress: Any,
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return what was measured in a scene, as in report.json, and as flat rows."""
+) -> tuple[list[Any], list[dict[str, Any]]]:
+    """Return what was measured in a scene, as the records of a report, and as flat rows."""
     from realtime.scene.read_scene import read_scene
     from reports.machine.own_process import in_own_process
-    from reports.report.scene import row_entry
+    from reports.report.scene import row_record
     from validation.estimates.quadrature import reference_image
     from validation.metrics.errors import plain
     from validation.study.reference import of_image
@@ -170,20 +172,18 @@ def _methods_in(
     scene, reference = read_scene(loaded.scene), of_image(reference_image(loaded.scene))
     size, path = (scene.camera.width, scene.camera.height), str(loaded.path or loaded.name)
     wanted = Measure("stages", seconds, every_metric=False)
-    entries, rows = [], []
+    records, rows = [], []
     useful = configurations_for(scene.features, chosen)
     for at, each in enumerate(useful):
         progress(at / len(useful), f"{loaded.name}: {each.label}")
         row, _ = run(Cell(path, size, (), each, wanted), scene, reference, apart=in_own_process if apart else None)
-        entries.append(row_entry(plain(row)))
+        records.append(row_record(plain(row), {}))
         rows.append({**_flat(row, each), "scene": loaded.name})
-    return {"name": loaded.name, "size": list(size), "methods": entries}, rows
+    return records, rows
 
 
 def _flat(row: Any, chosen: Any) -> dict[str, Any]:
     """Return the numbers of a row, see `MethodsStudy`."""
-    from dataclasses import fields
-
     from validation.metrics.errors import plain
     from validation.study.frame_times import FrameTimes
 

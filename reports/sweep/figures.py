@@ -106,7 +106,7 @@ def _figure(height: float) -> "Figure":
 
 def _styles(said: Summary) -> dict[str, dict[str, Any]]:
     """Return the styles of the configurations: those of the report, one colour and marker a method."""
-    return report_styles([{"methods": [{"method": sample.method, "label": sample.label} for sample in said.samples]}])
+    return report_styles(said.samples)
 
 
 def _errors(sample: Sample) -> Numbers:

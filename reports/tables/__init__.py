@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables: each is written once, as data with units, and drawn as terminal text, Markdown, HTML, LaTeX or CSV.
 
-A function of this room takes plain data, with the names of report.json where they stand there, and returns a `Table`.
-Who prints, writes a page or a paper chooses how it is drawn.
+A function of this room takes records, those of report.json where they stand there, and returns a `Table`. Who prints,
+writes a page or a paper chooses how it is drawn.
 
 Read in this order:
 

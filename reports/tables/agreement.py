@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The reference against Monte Carlo, as a table, and the light that single scattering leaves out."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
+from reports.data.records import Agreement, Scene
 from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, numbers, table, words
 
 _PERCENT = {"percent": True, "sign": True}
@@ -36,42 +36,41 @@ COLUMNS = (
 )
 
 
-def verdict(compared: Mapping[str, Any]) -> bool | None:
+def verdict(compared: Agreement) -> bool | None:
     """Return whether a comparison confirms the reference; None where it ran out of time before it could tell.
 
     Out of time is what stopped before the intervals were as narrow as wanted. It can still speak against the reference:
     by an interval that lies outside the margin as a whole.
     """
-    statistics = compared["statistics"]
-    if statistics["equivalent"]:
+    statistics = compared.statistics
+    if statistics.equivalent:
         return True
-    interval = statistics.get("relative_bias_ci")
-    if compared.get("finished", True) or interval is None or None in interval:
+    low, high = statistics.relative_bias_ci
+    if compared.finished or low is None or high is None:
         return False
-    low, high = interval
-    return None if low <= statistics["margin"] and high >= -statistics["margin"] else False
+    return None if low <= statistics.margin and high >= -statistics.margin else False
 
 
-def worst_interval(compared: Iterable[Mapping[str, Any]]) -> tuple[Mapping[str, Any], float]:
+def worst_interval(compared: Iterable[Agreement]) -> tuple[Agreement, float]:
     """Return the comparison whose 95 % interval of the relative bias reaches the furthest from 0, and how far.
 
     One whose interval is not known reaches furthest of all.
     """
 
-    def reach(comparison: Mapping[str, Any]) -> float:
-        low, high = comparison["statistics"]["relative_bias_ci"] or (None, None)
+    def reach(comparison: Agreement) -> float:
+        low, high = comparison.statistics.relative_bias_ci
         return float("inf") if low is None or high is None else max(abs(low), abs(high))
 
     worst = max(compared, key=reach)
     return worst, reach(worst)
 
 
-def trust_table(scenes: Sequence[Mapping[str, Any]]) -> Table:
+def trust_table(scenes: Sequence[Scene]) -> Table:
     """Return how far the reference of each scene can be trusted: its own bound, its checks, the estimators' intervals.
 
     An estimator has the worst of its intervals over the layers of a scene.
     """
-    estimators = list(dict.fromkeys(entry["estimator"] for scene in scenes for entry in scene["agreement"].values()))
+    estimators = list(dict.fromkeys(entry.estimator for scene in scenes for entry in scene.agreement.values()))
     columns = (
         *words("scene"),
         *numbers(bound="bound of its error", how={"share": True, "digits": 2}),
@@ -93,39 +92,39 @@ def trust_table(scenes: Sequence[Mapping[str, Any]]) -> Table:
     ).only(*order)
 
 
-def _trust(scene: Mapping[str, Any], estimators: Iterable[str]) -> Row:
-    values: dict[str, Value] = {"scene": scene["name"], "bound": scene["reference"]["relative_bound"]}
-    values["left"] = scene["reference"]["left"]
+def _trust(scene: Scene, estimators: Iterable[str]) -> Row:
+    values: dict[str, Value] = {"scene": scene.name, "bound": scene.reference.relative_bound}
+    values["left"] = scene.reference.left
     for name in estimators:
-        compared = [entry for entry in scene["agreement"].values() if entry["estimator"] == name]
+        compared = [entry for entry in scene.agreement.values() if entry.estimator == name]
         if not compared:
             continue
         verdicts = [verdict(entry) for entry in compared]
         good = False if False in verdicts else None if None in verdicts else True
-        worst = worst_interval(compared)[0]["statistics"]
-        values[name] = Interval.of(worst["relative_bias_ci"])
-        values[f"{name} agrees"] = Verdict(good, f"±{100 * worst['margin']:g} %")
+        worst = worst_interval(compared)[0].statistics
+        values[name] = Interval.of(worst.relative_bias_ci)
+        values[f"{name} agrees"] = Verdict(good, f"±{100 * worst.margin:g} %")
     return Row(values)
 
 
-def agreement_table(scene: Mapping[str, Any]) -> Table:
+def agreement_table(scene: Scene) -> Table:
     """Return what estimators say of the reference of a scene of report.json."""
     return table(
-        f"Monte Carlo estimators against the quadrature in {scene['name']}",
+        f"Monte Carlo estimators against the quadrature in {scene.name}",
         COLUMNS,
-        [_values(name, comparison) for name, comparison in scene["agreement"].items()],
+        [_values(name, comparison) for name, comparison in scene.agreement.items()],
         explanation="Our own integrator, and Mitsuba's volpath against the same integral with the shadow ray shortened "
         "by the measured epsilon.",
     )
 
 
-def _values(name: str, comparison: Mapping[str, Any]) -> Mapping[str, Any]:
+def _values(name: str, comparison: Agreement) -> dict[str, Value]:
     return {
-        **comparison,
-        **comparison["statistics"],
+        **vars(comparison.statistics),
+        **vars(comparison),
         "name": name,
-        "interval": Interval.of(comparison["statistics"]["relative_bias_ci"]),
-        "effort": "{width} x {height} pixels, {batches} x {samples} spp".format(**comparison),
+        "interval": Interval.of(comparison.statistics.relative_bias_ci),
+        "effort": "{width} x {height} pixels, {batches} x {samples} spp".format(**vars(comparison)),
         "agrees": Verdict(verdict(comparison)),
     }
 
@@ -133,7 +132,7 @@ def _values(name: str, comparison: Mapping[str, Any]) -> Mapping[str, Any]:
 # Multiple scattering
 
 
-def left_out_table(scenes: Iterable[Mapping[str, Any]], *, code: bool = False) -> Table:
+def left_out_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
     """Return for every scene of a report the shares of light that single scattering leaves out."""
     share = {"percent": True}
     columns = (
@@ -146,15 +145,13 @@ def left_out_table(scenes: Iterable[Mapping[str, Any]], *, code: bool = False) -
         "Shares of all light that paths of up to max. edges bring, with 95 % intervals; the second adds surfaces that "
         "light one another."
     )
-    rows = (_left_out(scene, Name(scene["name"]) if code else scene["name"]) for scene in scenes)
+    rows = (_left_out(scene, Name(scene.name) if code else scene.name) for scene in scenes)
     return table("Multiple scattering", columns, rows, explanation=explanation)
 
 
-def _left_out(scene: Mapping[str, Any], name: Value) -> Row:
-    multiple = scene["multiple"]
-    if not multiple:
-        return Row({"scene": name}, "not measured")
-    values: dict[str, Value] = {"scene": name, "max_depth": multiple.get("max_depth")}
-    for key in ("medium", "everything"):
-        values |= {key: multiple[key]["value"], f"{key}_interval": Interval.of(multiple[key]["interval"])}
+def _left_out(scene: Scene, name: Value) -> Row:
+    multiple = scene.multiple
+    values: dict[str, Value] = {"scene": name, "max_depth": multiple.max_depth}
+    for key, share in (("medium", multiple.medium), ("everything", multiple.everything)):
+        values |= {key: share.value, f"{key}_interval": Interval.of(share.interval)}
     return Row(values)

@@ -4,6 +4,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from reports.data.records import Kernel, Rays
 from reports.tables.table import Column, Measured, Name, Row, Table, Value, numbers, table, words
 
 Entry = Mapping[str, Any]
@@ -55,7 +56,7 @@ def level_table(title: str, levels: Iterable[Entry]) -> Table:
     return table(title, columns, [(level["level"], level["cheapest"] or "none", level["ns"]) for level in levels])
 
 
-def stability_summary(found: Iterable[Entry]) -> Table:
+def stability_summary(found: Iterable[Kernel]) -> Table:
     """Return a row for each kernel and each set of rays, all of these together."""
     columns = (
         *words("kernel", set="rays"),
@@ -65,11 +66,10 @@ def stability_summary(found: Iterable[Entry]) -> Table:
         *numbers(double="float64 largest", how={"digits": 2}),
     )
 
-    def row(kernel: Entry, rays: Entry) -> Entry:
-        single = rays["single"]["all"]
-        odd = single["nan"] + single["infinite"] + single["negative"]
-        largest = rays["double"]["all"]["max"]
-        return {**single, "kernel": kernel["kernel"], "set": rays["name"], "odd": odd, "double": largest}
+    def row(kernel: str, rays: Rays) -> dict[str, Value]:
+        single, odd = rays.single["all"], ("nan", "infinite", "negative")
+        values = {**vars(single), "odd": sum(getattr(single, name) for name in odd)}
+        return values | {"kernel": kernel, "set": rays.name, "double": rays.double["all"].max}
 
-    rows = (row(kernel, rays) for kernel in found for rays in kernel["sets"])
+    rows = (row(kernel.kernel, rays) for kernel in found for rays in kernel.sets)
     return table("Robustness of the kernels", columns, rows, explanation="All rays of each set together.")

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What methods cost and how wrong they are: a table of studies, the page, the documentation and papers."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 from realtime.methods.shader.source import is_shader
+from reports.data.records import MethodRow, Scene, Timing
 from reports.tables.table import (
     Column,
-    Measured,
     Name,
     Row,
     Table,
@@ -20,8 +19,6 @@ from reports.tables.table import (
     table,
     words,
 )
-
-Entry = Mapping[str, Any]  #: of a method in a scene, as in report.json
 
 #: What is timed of a frame, by its name in report.json.
 TIMES = ("frame", "airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_cached", "colours_changed")
@@ -77,7 +74,7 @@ BENCH = (
 )
 
 
-def methods_table(title: str, methods: Iterable[Entry | Row], *keys: str, explanation: str = "") -> Table:
+def methods_table(title: str, methods: Iterable[MethodRow | Row], *keys: str, explanation: str = "") -> Table:
     """Return the table of the `methods` of a scene of report.json, or of rows that have some of `COLUMNS`.
 
     `keys` are those of `COLUMNS`; `BENCH` by default. Where a shader was timed, its device stands beside its time.
@@ -89,31 +86,27 @@ def methods_table(title: str, methods: Iterable[Entry | Row], *keys: str, explan
     return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*shown)
 
 
-def method_row(entry: Entry, *, shadows: bool = False) -> Row:
+def method_row(entry: MethodRow, *, shadows: bool = False) -> Row:
     """Return what a method costs and how wrong it is as a row; with `shadows` a method that knows none is marked."""
-    kind, layer = entry.get("kind"), entry.get("layer")
-    users = "user's shader" if is_shader(entry.get("method", "")) else "user's function"
-    remarks = [f"image, {layer}"] if kind == "image" else [users] if kind == "function" else []
-    if shadows and kind != "image" and not entry["knows_shadows"]:
+    users = "user's shader" if is_shader(entry.method) else "user's function"
+    remarks = [f"image, {entry.layer}"] if entry.kind == "image" else [users] if entry.kind == "function" else []
+    if shadows and entry.kind != "image" and not entry.knows_shadows:
         remarks.append("no shadows")
-    remarks += [entry["note"]] if entry.get("note") else []
-    values: dict[str, Value] = {"label": entry["label"]}
-    if entry["refused"]:
-        why = "left out" if entry.get("left_out") else "refused"
-        return Row(values, f"{why}: {entry['refused']}", tuple(remarks))
-    times, error = entry["times"] or {}, entry["error"] or {}
-    values |= {name: measured(times.get(name)) for name in TIMES}
-    values |= {f"{name}_rate": per_second(measured(times.get(name))) for name in ("frame", "airlight")}
-    values |= {name: error.get(name) for name in ERRORS}
-    values["device"] = entry.get("device")
-    values["memory"] = entry.get("memory")
-    values["flip"] = (entry.get("flip") or {}).get("value")
+    remarks += [entry.note] if entry.note else []
+    values: dict[str, Value] = {"label": entry.label}
+    if entry.refused:
+        why = "left out" if entry.left_out else "refused"
+        return Row(values, f"{why}: {entry.refused}", tuple(remarks))
+    values |= {name: measured(getattr(entry.times, name, None)) for name in TIMES}
+    values |= {f"{name}_rate": per_second(getattr(entry.times, name, None)) for name in ("frame", "airlight")}
+    values |= {name: getattr(entry.error, name, None) for name in ERRORS}
+    values |= {"device": entry.device, "memory": entry.memory, "flip": entry.flip.value if entry.flip else None}
     return Row(values, remarks=tuple(remarks))
 
 
-def per_second(time: Measured | None) -> float | None:
-    """Return how often a second something can be done that takes so many milliseconds."""
-    return 1000 / time.median if time and time.median > 0 else None
+def per_second(time: Timing | None) -> float | None:
+    """Return how often a second something can be done."""
+    return 1000 / time.median_ms if time and time.median_ms > 0 else None
 
 
 def rate_words(milliseconds: float) -> str:
@@ -121,29 +114,29 @@ def rate_words(milliseconds: float) -> str:
     return f"{digits_of(1000 / milliseconds, COLUMNS['frame_rate'])} frames/s"
 
 
-def fastest_within(error: float, entries: Iterable[Entry]) -> Entry | None:
-    """Return the method of the fastest frame among those with at most a relative RMSE; None where there is none.
+def fastest_within(error: float, entries: Iterable[MethodRow]) -> tuple[MethodRow, float] | None:
+    """Return the method of the fastest frame [ms] among those with at most a relative RMSE; None where there is none.
 
     Shaders run on another device, and are in no race with others. Pixels that are not finite are left out of the RMSE:
     a method that has any must not win by it.
     """
 
-    def reaches(entry: Entry) -> bool:
-        errors = entry.get("error") or {}
-        rmse = errors.get("relative_rmse")
-        timed = bool(entry.get("times")) and not entry.get("device")
-        return timed and rmse is not None and rmse <= error and not errors.get("nonfinite")
+    def reaches(entry: MethodRow) -> bool:
+        if entry.device or entry.error is None or entry.error.relative_rmse is None:
+            return False
+        return entry.error.relative_rmse <= error and not entry.error.nonfinite
 
-    return min(filter(reaches, entries), key=lambda entry: entry["times"]["frame"]["median_ms"], default=None)
+    raced = [(entry, entry.times.frame.median_ms) for entry in entries if entry.times and reaches(entry)]
+    return min(raced, key=lambda pair: pair[1], default=None)
 
 
-def fastest_table(scenes: Iterable[Entry], *, code: bool = False) -> Table:
+def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
     """Return for every scene of a report the fastest method within each relative RMSE of `TARGETS`."""
     columns = [Column(f"within_{target:g}", f"within {100 * target:g} %", words=True) for target in TARGETS]
     rows = (
         (
-            Name(scene["name"]) if code else scene["name"],
-            *(_name_and_time(fastest_within(target, scene["methods"])) for target in TARGETS),
+            Name(scene.name) if code else scene.name,
+            *(_name_and_time(fastest_within(target, scene.methods)) for target in TARGETS),
         )
         for scene in scenes
     )
@@ -151,11 +144,11 @@ def fastest_table(scenes: Iterable[Entry], *, code: bool = False) -> Table:
     return table("The fastest method within an error", (*words("scene"), *columns), rows, explanation=explanation)
 
 
-def _name_and_time(entry: Entry | None) -> str:
-    if entry is None:
+def _name_and_time(found: tuple[MethodRow, float] | None) -> str:
+    if found is None:
         return "none"
-    milliseconds = entry["times"]["frame"]["median_ms"]
-    return f"{entry['label']}: {number(milliseconds)} ms, {rate_words(milliseconds)}"
+    entry, milliseconds = found
+    return f"{entry.label}: {number(milliseconds)} ms, {rate_words(milliseconds)}"
 
 
 #: By kernel, the paper and what it leaves wrong.
@@ -172,7 +165,7 @@ _VALUES = {
 }
 
 
-def published_as(entry: Mapping[str, Any]) -> str:
+def published_as(entry: MethodRow) -> str:
     """Return which paper a method of report.json reproduces with its errors, and what is wrong; else nothing."""
-    values = (_VALUES.get((name, value), "") for name, value in entry.get("parameters", {}).items())
-    return next(filter(None, values), "") or _KERNELS.get(entry.get("kernel") or "", "")
+    values = (_VALUES.get((name, str(value)), "") for name, value in entry.parameters.items())
+    return next(filter(None, values), "") or _KERNELS.get(entry.kernel or "", "")

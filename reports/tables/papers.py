@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The claims of papers with their verdicts, and the numbers that papers print beside ours.
 
-Rows are those of `validation.papers.claims.judged`, as they stand under `papers` of report.json.
+Rows are those that stand under `papers` of report.json.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from reports.tables.table import Interval, Row, Table, Value, numbers, table, words
-
-Data = Mapping[str, Any]
+from validation.papers.claims import VERDICTS, Judged, papers
 
 _COLUMNS = (
     *words(item="item"),
@@ -24,23 +22,23 @@ _COLUMNS = (
 )
 
 
-def paper_tables(rows: Sequence[Data]) -> list[Table]:
+def paper_tables(rows: Sequence[Judged]) -> list[Table]:
     """Return for each paper a table of verdicts and one of numbers without a verdict."""
     return [*verdict_tables(rows), *number_tables(rows)]
 
 
-def verdict_tables(rows: Sequence[Data]) -> list[Table]:
+def verdict_tables(rows: Sequence[Judged]) -> list[Table]:
     """Return a table of verdicts for each paper."""
-    judged = [row for row in rows if row["verdict"] is not None]
+    judged = [row for row in rows if row.verdict is not None]
     return [
         replace(_table(paper, several), explanation=f"{count_words(several)}.")
         for paper, several in _by_paper(judged).items()
     ]
 
 
-def number_tables(rows: Sequence[Data]) -> list[Table]:
+def number_tables(rows: Sequence[Judged]) -> list[Table]:
     """Return a table of the numbers without a verdict for each paper."""
-    plain = [row for row in rows if row["verdict"] is None]
+    plain = [row for row in rows if row.verdict is None]
     return [
         _table(f"{paper}: numbers beside ours", several).only(
             "item", "words", "published", "measured", "interval", "unit", "why"
@@ -49,31 +47,27 @@ def number_tables(rows: Sequence[Data]) -> list[Table]:
     ]
 
 
-def _by_paper(rows: Sequence[Data]) -> dict[str, list[Data]]:
-    from validation.papers.claims import papers
-
+def _by_paper(rows: Sequence[Judged]) -> dict[str, list[Judged]]:
     named = papers()
-    found: dict[str, list[Data]] = {}
+    found: dict[str, list[Judged]] = {}
     for row in rows:
-        found.setdefault(named.get(row["paper"], str(row["paper"])), []).append(row)
+        found.setdefault(named.get(row.paper, row.paper), []).append(row)
     return found
 
 
-def _table(title: str, rows: Sequence[Data]) -> Table:
+def _table(title: str, rows: Sequence[Judged]) -> Table:
     return table(title, _COLUMNS, [Row(_cells(row)) for row in rows])
 
 
-def _cells(row: Data) -> dict[str, Value]:
-    noisy = row["low"] is not None and row["low"] < row["high"]
-    values = {name: row[name] for name in ("item", "words", "verdict", "published", "measured", "unit", "why")}
-    return values | ({"interval": Interval(row["low"], row["high"])} if noisy else {})
+def _cells(row: Judged) -> dict[str, Value]:
+    interval = Interval.of((row.low, row.high))
+    values = {name: getattr(row, name) for name in ("item", "words", "verdict", "published", "measured", "unit", "why")}
+    return values | ({"interval": interval} if interval and interval.low < interval.high else {})
 
 
-def count_words(rows: Sequence[Data]) -> str:
+def count_words(rows: Sequence[Judged]) -> str:
     """Return how many rows have each verdict, in words."""
-    from validation.papers.claims import VERDICTS
-
-    counts = Counter(row["verdict"] for row in rows)
+    counts = Counter(row.verdict for row in rows)
     return f"{len(rows)} claims: " + ", ".join(
         f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict]
     )

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from reports.data.records import Timing
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -179,6 +181,6 @@ def with_spread(median: float, low: float, high: float) -> tuple[str, str, str]:
     return f"{median:.{places}f}", f"{median - low:.{places}f}", f"{high - median:.{places}f}"
 
 
-def measured(timing: Mapping[str, float] | None) -> Measured | None:
+def measured(timing: Timing | None) -> Measured | None:
     """Return a timing of report.json, None for none."""
-    return None if timing is None else Measured(timing["median_ms"], timing["low_ms"], timing["high_ms"])
+    return None if timing is None else Measured(timing.median_ms, timing.low_ms, timing.high_ms)

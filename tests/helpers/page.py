@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from reference.storage.exr import Image, write_exr
+from reports.data.records import Report
 from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene, settings
 
 WIDTH, HEIGHT = 32, 24
@@ -65,48 +66,46 @@ def method(label, **changes):
 
 
 AGREEMENT = agreement(margin=0.005, detectable=0.0021, relative_bias_ci=[-0.0011, 0.0014])
-DATA: dict[str, Any] = checked(
-    report_of(
-        [
-            scene(
-                "hall",
-                [
-                    method("good (k)"),
-                    method(
-                        "flat",
-                        knows_shadows=False,
-                        files={"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"},
-                    ),
-                ],
-                purpose="A hall.",
-                published="Billeter 2010",
-                size=[WIDTH, HEIGHT],
-                plan={"shadows": "visibility tests", "medium": "unbounded"},
-                reference={
-                    "mean": 0.98765,
-                    "relative_bound": 1.2e-6,
-                    "transitions": 4321,
-                    "missed": 0.0007,
-                    "checked": 98765,
-                    "disagreements": 12,
-                    "refined": 11,
-                    "left": 1,
-                },
-                agreement={"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
-                exposure=2.5,
-                files={"picture": "s/reference.png", "exr": "s/reference.exr", "airlight": "s/reference-airlight.png"},
-            )
-        ],
-        created="2026-11-21 12:34:56 +0000",
-        command="airlight report --quick",
-        seconds=12.3,
-        computed=9,
-        settings=settings(image=[WIDTH, HEIGHT], timed=[64, 48]),
-        claims=[
-            {"kind": "reference", "text": "The truth is confirmed.", "good": True},
-            {"kind": "left-out", "text": "Every method here scatters once.", "good": None},
-        ],
-    )
+DATA: dict[str, Any] = report_of(
+    [
+        scene(
+            "hall",
+            [
+                method("good (k)"),
+                method(
+                    "flat",
+                    knows_shadows=False,
+                    files={"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"},
+                ),
+            ],
+            purpose="A hall.",
+            published="Billeter 2010",
+            size=[WIDTH, HEIGHT],
+            plan={"shadows": "visibility tests", "medium": "unbounded"},
+            reference={
+                "mean": 0.98765,
+                "relative_bound": 1.2e-6,
+                "transitions": 4321,
+                "missed": 0.0007,
+                "checked": 98765,
+                "disagreements": 12,
+                "refined": 11,
+                "left": 1,
+            },
+            agreement={"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
+            exposure=2.5,
+            files={"picture": "s/reference.png", "exr": "s/reference.exr", "airlight": "s/reference-airlight.png"},
+        )
+    ],
+    created="2026-11-21 12:34:56 +0000",
+    command="airlight report --quick",
+    seconds=12.3,
+    computed=9,
+    settings=settings(image=[WIDTH, HEIGHT], timed=[64, 48]),
+    claims=[
+        {"kind": "reference", "text": "The truth is confirmed.", "good": True},
+        {"kind": "left-out", "text": "Every method here scatters once.", "good": None},
+    ],
 )
 
 
@@ -140,6 +139,11 @@ def write_files(folder: Path) -> Path:
 def report_data() -> dict[str, Any]:
     """Return a copy of `DATA` that a test may change."""
     return copy.deepcopy(DATA)
+
+
+def small_report() -> Report:
+    """Return the record of `DATA`."""
+    return checked(DATA)
 
 
 def engine_image() -> dict[str, Any]:

@@ -1,21 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Content of report.json by hand: one builder for all tests, whose parts have every key that the schema asks for.
+"""Content of report.json by hand: one builder for all tests, whose parts have every key that the records ask for.
 
-`timing`, `errors`, `entry`, `scene`, `report_of` and their likes make the parts, with arguments for what a test is
-about; `checked` holds a whole report to the schema. `report` makes reports for comparisons, with times that are as
-noisy as a machine.
+`timing`, `errors`, `entry`, `scene`, `report_of` and their likes make the parts as JSON has them, with arguments for
+what a test is about; `checked` makes the record of a whole report, `record_of` that of a part. `report` makes reports
+for comparisons, with times that are as noisy as a machine.
 """
 
 import copy
-import functools
-import json
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jsonschema import Draft202012Validator
 
-from reports.data.reader import SCHEMA_FILE
+from reports.data.reader import record_of
+from reports.data.records import Report
 
 LABELS = ("unshadowed (exact)", "ray-march (steps=100)", "shadow-planes (exact)", "light-volumes (exact)")
 SCENES = ("fog", "hall", "pens")
@@ -24,15 +22,9 @@ WHEN = "2026-11-21 12:00:00 +0000"
 _STAGES = {"surface": 0.3, "airlight": 0.7, "frame": 1.0, "light_moved": 1.4, "objects_moved": 1.9}  # of a frame's work
 
 
-@functools.cache
-def _validator() -> Draft202012Validator:
-    return Draft202012Validator(json.loads(SCHEMA_FILE.read_text(encoding="utf-8")))
-
-
-def checked(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the content of a report that keeps to the schema; a fake that does not is a fault of its test."""
-    _validator().validate(data)
-    return data
+def checked(data: dict[str, Any]) -> Report:
+    """Return the record of a report; a fake that is none is a fault of its test."""
+    return record_of(data, Report)
 
 
 def timing(median: float) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import importlib
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -145,19 +145,33 @@ def verdict(claim: Claim, figure: Figure) -> str:
     return REPRODUCED if answers == {True} else DIFFERS if claim.ours else NOT_REPRODUCED
 
 
-def judged(claim: Claim, figures: Figures) -> dict[str, Any]:
-    """Return a claim beside what was measured, ready for JSON: `verdict` is None for a number without a direction."""
-    row: dict[str, Any] = {"paper": claim.paper, "item": claim.item, "words": claim.words, "verdict": None}
-    row |= {"published": claim.published, "measured": None, "low": None, "high": None}
-    row |= {"unit": claim.unit, "why": claim.why}
+@dataclass(frozen=True)
+class Judged:
+    """A claim beside what was measured; what is not known is None."""
+
+    paper: str
+    item: str
+    words: str
+    verdict: str | None  #: of `VERDICTS`; None for a number without a direction
+    published: float | None
+    measured: float | None
+    low: float | None
+    high: float | None
+    unit: str
+    why: str
+
+
+def judged(claim: Claim, figures: Figures) -> Judged:
+    """Return a claim beside what was measured."""
     figure = taken(claim, figures) if claim.experiment else claim.why
+    value, low, high = (None, None, None) if isinstance(figure, str) else figure
+    row = Judged(claim.paper, claim.item, claim.words, None, claim.published, value, low, high, claim.unit, claim.why)
     if isinstance(figure, str):
-        return row | {"verdict": IMPOSSIBLE if claim.direction or not claim.experiment else None, "why": figure}
-    row |= dict(zip(("measured", "low", "high"), figure, strict=True))
+        return replace(row, verdict=IMPOSSIBLE if claim.direction or not claim.experiment else None, why=figure)
     if not claim.direction:
         return row
     found = verdict(claim, figure)
     why = f"{claim.rule}: {claim.why}"
     if found == IMPOSSIBLE:
         why = f"cannot be told apart, the figure lies between {figure[1]:.3g} and {figure[2]:.3g}; {why}"
-    return row | {"verdict": found, "why": why}
+    return replace(row, verdict=found, why=why)

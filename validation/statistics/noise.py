@@ -76,7 +76,7 @@ _WITNESSES = {
     "objects_moved": (),
 }
 
-Timing = Mapping[str, Any]  #: median_ms, low_ms, high_ms, repetitions, cpu_ms
+Timing = Any  #: has median_ms, low_ms, high_ms, repetitions
 Times = Mapping[str, Timing]  #: by stage
 
 
@@ -102,17 +102,17 @@ def error_band(
 def spread(times: Iterable[Times]) -> float:
     """Return the geometric mean of upper over lower quartile of all timings [1]; 1 where none has quartiles."""
     ratios = [
-        timing["high_ms"] / timing["low_ms"]
+        timing.high_ms / timing.low_ms
         for stages in times
         for timing in stages.values()
-        if timing["repetitions"] >= _FEW and timing["median_ms"] >= SHORTEST and timing["low_ms"] > 0
+        if timing.repetitions >= _FEW and timing.median_ms >= SHORTEST and timing.low_ms > 0
     ]
     return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
 
 
 def drift(pairs: Iterable[tuple[Times, Times]]) -> float:
     """Return the median ratio [1] of the times of new to old frames; 1 where there are none."""
-    ratios = [new["frame"]["median_ms"] / old["frame"]["median_ms"] for old, new in pairs]
+    ratios = [new["frame"].median_ms / old["frame"].median_ms for old, new in pairs]
     return math.exp(float(np.median(np.log(ratios)))) if ratios else 1.0
 
 
@@ -139,10 +139,10 @@ def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list
         growth = now[stage] - was[stage]
         witnesses = [now[name] - was[name] for name in _WITNESSES[stage] if name in was]
         power = max(1, 3 - len(witnesses))
-        if min(before[stage]["repetitions"], after[stage]["repetitions"]) < _FEW:
+        if min(before[stage].repetitions, after[stage].repetitions) < _FEW:
             power = max(2, power)
         longer = growth >= SHORTEST and now[stage] >= least**power * was[stage]
-        apart = after[stage]["low_ms"] / scale > before[stage]["high_ms"]
+        apart = after[stage].low_ms / scale > before[stage].high_ms
         if longer and apart and all(witness >= 0.5 * growth for witness in witnesses):
             slow.append(stage)
     return slow
@@ -150,16 +150,19 @@ def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list
 
 def _medians(times: Times) -> dict[str, float]:
     """Return the medians of stages, and that of surface and airlight together as 'sum' [ms]."""
-    medians = {stage: float(timing["median_ms"]) for stage, timing in times.items()}
+    medians = {stage: timing.median_ms for stage, timing in times.items()}
     if {"surface", "airlight"} <= set(times):
         medians["sum"] = medians["surface"] + medians["airlight"]
     return medians
 
 
-def other_power(old: Mapping[str, Any], new: Mapping[str, Any]) -> float:
-    """Return by how much a time grows with another power of the work than before, 0 where noise may explain it."""
-    before, after = old["exponent"], new["exponent"]
+def other_power(old: Any, new: Any) -> float:
+    """Return by how much a time grows with another power of the work than before, 0 where noise may explain it.
+
+    Both have an `exponent` and its `standard_error`, None where it is not known.
+    """
+    before, after = old.exponent, new.exponent
     if before is None or after is None:
         return 0.0
-    scatter = math.hypot(old["standard_error"] or 0.0, new["standard_error"] or 0.0)
+    scatter = math.hypot(old.standard_error or 0.0, new.standard_error or 0.0)
     return after - before if abs(after - before) > max(POWER_TOLERANCE, 3 * scatter) else 0.0

@@ -3,6 +3,7 @@
 
 import airlight
 from tests.helpers.api import brighter
+from tests.helpers.reports import checked, report_of
 
 
 def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
@@ -10,8 +11,7 @@ def test_report_hands_on_what_it_was_given(variant, tmp_path, monkeypatch):
 
     def write(folder, study, **options):
         given.update(options, folder=folder, study=study)
-        made = {"claims": [{"text": "so"}], "scenes": [], "created": "", "seconds": 1, "cached": 0, "computed": 1}
-        return made | {"measured": None}
+        return checked(report_of([], claims=[{"kind": "image", "text": "so", "good": None}]))
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
     report = airlight.report("open-fog", method=["min-max", brighter], output=tmp_path / "out")

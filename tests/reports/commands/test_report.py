@@ -7,6 +7,7 @@ from PIL import Image as Picture
 
 from reference.storage.exr import Image, write_exr
 from reports.commands.main import run
+from tests.helpers.reports import checked, report_of
 
 METHOD = """
 print("at import")
@@ -63,8 +64,7 @@ def handed_on(monkeypatch):
 
     def write(folder, study, **options):
         given.update(options, folder=folder, scenes=study.scenes, configurations=study.configurations)
-        claims = [{"text": "`--full` has all."}]
-        return {"claims": claims, "scenes": [], "seconds": 1.2, "cached": 0, "computed": 3, "measured": None}
+        return checked(report_of([], claims=[{"kind": "image", "text": "`--full` has all.", "good": None}]))
 
     monkeypatch.setattr("reports.report.measure.write_report", write)
     return given
@@ -162,19 +162,19 @@ def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
 def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     import json
 
-    from reports.data.reader import named_files
-    from tests.helpers.page import report_data, write_files
+    from reports.data.reader import named_files, report_text
+    from tests.helpers.page import report_data, small_report, write_files
 
     folder = write_files(tmp_path / "r")
-    for name in named_files(report_data()):
+    for name in named_files(small_report()):
         if not (folder / name).exists():
             Picture.new("RGB", (6, 4)).save(folder / name, "PNG")
     (folder / "report.json").write_text(json.dumps(report_data()), encoding="utf-8")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "again"), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == report_data()
+    assert json.loads(capsys.readouterr().out) == json.loads(report_text(small_report()))
     assert "The truth is confirmed." in (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "again" / "report.json").read_text(encoding="utf-8")) == report_data()
-    (folder / next(name for name in named_files(report_data()) if name.endswith(".png"))).write_bytes(b"half a file")
+    (folder / next(name for name in named_files(small_report()) if name.endswith(".png"))).write_bytes(b"half a file")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "third")]) == 2
     assert "is no picture that can be read" in capsys.readouterr().err
 

@@ -7,9 +7,9 @@ import pytest
 
 from realtime.methods.shader.client import ShaderHost
 from reports.commands import main as cli
-from reports.data.own_faults import own_fault
 from reports.machine import driver_check
 from reports.machine.opengl import opengl_status, require_opengl
+from reports.report.claims import own_fault
 from tests.helpers.shaders import EXAMPLES, need_opengl
 
 MARCHER = str(EXAMPLES / "marcher.glsl")

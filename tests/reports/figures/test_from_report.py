@@ -67,7 +67,7 @@ def report(tmp_path_factory):
 
 def test_the_chart_has_what_has_times(report):
     data, _ = load_report(report)
-    labels = [entry["label"] for scene in data["scenes"] for entry in figures._timed(scene)]
+    labels = [entry.label for scene in data.scenes for entry in figures._timed(scene)]
     assert labels == list(_WRONG)  # neither the refused one nor the one without times
 
 
@@ -96,7 +96,7 @@ def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(repor
 def test_the_strip_shows_where_methods_are_wrong(report):
     data, place = load_report(report)
     _, methods, images = figures._strip(data, place, None, None)
-    assert [entry["label"] for entry in methods] == list(_WRONG)
+    assert [entry.label for entry in methods] == list(_WRONG)
     first, other = figures.worst_squares(images, 4)
     assert first == (20, 2)  # where one method is half as bright again
     assert abs(other[0] - 20) >= 4 or abs(other[1] - 2) >= 4

@@ -6,21 +6,26 @@ import json
 import numpy as np
 import pytest
 
+from reports.data.records import MethodRow
 from reports.page.chart import speed_error_chart
 from reports.page.filters import DASH
 from reports.page.render import SCRIPTS, render_page
 from reports.plotting.figure import speed_panel
 from reports.tables.methods import fastest_table
 from tests.helpers.page import DATA, Page, engine_image, report_data, write_files
-from tests.helpers.reports import growth_record, refused
+from tests.helpers.reports import checked, entry, growth_record, record_of, refused
 
 _ERRORS = {"rays": 77, "refused": 5, "median": 1.5e-7, "p99": 2.5e-6, "max": 4.5e-6}
-_ERRORS |= {"nan": 0, "infinite": 0, "negative": 2}
+_ERRORS |= {"nan": 0, "infinite": 0, "negative": 2, "mean": 2e-7, "worst": None}
+_GROUPS = {name: {"all": _ERRORS} for name in ("single", "double", "single_against_double")}
 STABILITY = [
     {
         "kernel": "my-kernel",
+        "exact": True,
+        "refused": {},
+        "gamma": {},
         "broken": ["law of scale"],
-        "sets": [{"name": "certified", "single": {"all": _ERRORS}, "double": {"all": _ERRORS}}],
+        "sets": [{"name": "certified", "columns": "", **_GROUPS}],
     }
 ]
 
@@ -51,7 +56,7 @@ def folder(tmp_path_factory):
 
 
 def render(data, folder):
-    return Page(render_page(data, folder))
+    return Page(render_page(checked(data), folder))
 
 
 def test_page_shows_the_numbers_of_the_data(data, folder):
@@ -62,13 +67,13 @@ def test_page_shows_the_numbers_of_the_data(data, folder):
         assert shown in text, shown
     for claim in DATA["claims"]:
         assert claim["text"] in text
-    for row in fastest_table(DATA["scenes"]).rows:
+    for row in fastest_table(checked(DATA).scenes).rows:
         assert all(cell in text for cell in row.values.values())
     for words in ("airlight report --quick", "mitsuba 3.9.1", "my-kernel", "not reproduced", "numbers beside ours"):
         assert words in text
     index = json.loads(page.script("images"))
     assert [entry["label"] for entry in index["scenes"][0]["methods"]] == ["good (k)", "flat"]
-    assert render_page(data, folder) == render_page(report_data(), folder)
+    assert render(data, folder).source == render(report_data(), folder).source
 
 
 @pytest.mark.claim("report-stands-alone")
@@ -132,9 +137,9 @@ def test_missing_values_are_dashes_and_failures_are_marked(data, folder):
 def test_bars_of_noisy_methods_go_down_to_their_bias():
     from matplotlib.figure import Figure
 
-    noise = {"rmse": 0.2, "root_bias": None, "most_bias": 0.05}
-    entries = [report_data()["scenes"][0]["methods"][0] | {"label": str(n)} for n in range(2)]
-    entries[1]["noise"] = noise
+    noise = {"runs": 8, "bias": 0.0, "bias_within": 0.1, "rmse": 0.2, "rmse_within": 0.1}
+    noise |= {"root_bias": None, "most_bias": 0.05}
+    entries = [record_of(entry(str(n), noise=noise if n else None), MethodRow) for n in range(2)]
     panel = Figure().subplots()
     speed_panel(panel, "scene", entries, {"0": {}, "1": {}})
     bars = [bar.get_segments() for bar in panel.collections if np.ptp(bar.get_segments()[0][:, 1])]
@@ -145,6 +150,7 @@ def test_the_chart_has_a_panel_for_each_scene_whatever_it_is_called():
     """A dollar begins mathematics in matplotlib; half a formula would end the report after all its work."""
     scenes = [report_data()["scenes"][0] | {"name": name} for name in ("hall", "50$ a_b^c $\\frac{$")]
     scenes[1]["methods"] += [refused("refused", "x"), engine_image()]  # no place on a logarithmic axis
-    svg = speed_error_chart(scenes)
-    assert svg == speed_error_chart(scenes)
+    records = checked(report_data() | {"scenes": scenes}).scenes
+    svg = speed_error_chart(records)
+    assert svg == speed_error_chart(records)
     assert all(svg.count(f">{label}<") == 1 for label in ("hall", "good (k)", "flat"))

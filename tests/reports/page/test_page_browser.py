@@ -7,7 +7,7 @@ import pytest
 from reports.page.render import render_page
 from reports.plotting.pictures import error_map, tone_mapped
 from tests.helpers.browser import as_number, drawn, layer, pixels, point_at, probe_row, viewer, watched
-from tests.helpers.page import HEIGHT, WIDTH, report_data, write_files
+from tests.helpers.page import HEIGHT, WIDTH, small_report, write_files
 
 
 @pytest.mark.slow
@@ -15,7 +15,7 @@ from tests.helpers.page import HEIGHT, WIDTH, report_data, write_files
 def test_the_page_shows_what_the_files_hold(browser, tmp_path):
     folder = write_files(tmp_path)
     path = folder / "report.html"
-    path.write_text(render_page(report_data(), folder), encoding="utf-8")
+    path.write_text(render_page(small_report(), folder), encoding="utf-8")
     page, told = watched(browser)
     page.goto(path.as_uri())
     page.wait_for_selector("html[data-drawn]")

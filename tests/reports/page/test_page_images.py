@@ -2,6 +2,7 @@
 """The images in a page: what is decoded is what the files hold, to the bound of the code, whatever the limit."""
 
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from reports.page.image_codec import (
     reference_values,
 )
 from reports.page.image_index import page_images
-from tests.helpers.page import report_data, write_files
+from tests.helpers.page import small_report, write_files
 
 
 def difference_values(codes: Codes) -> Array:
@@ -89,7 +90,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def scene():
-    return report_data()["scenes"][0]
+    return small_report().scenes[0]
 
 
 def scene_images(scene, folder, limit):
@@ -111,7 +112,7 @@ def test_limits_are_kept_by_fewer_pixels(scene, folder):
     assert seen[0] == 1
     assert seen[-1] > 1
     assert seen == sorted(seen)
-    small = scene | {"methods": scene["methods"][:1]}
+    small = replace(scene, methods=scene.methods[:1])
     both = page_images([small, scene], folder, 10**8)
     fitted = page_images([small, scene], folder, sum(len(packed.data) for packed in both) - 1)
     assert fitted[0] == both[0]  # the largest scene gives way first

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import pytest
 
-from reports.report.scene import reference_data
+from reports.report.scene import reference_record
 from validation.metrics.errors import plain
 
 
@@ -32,7 +32,7 @@ def test_truth_without_light_that_is_finite_has_no_numbers_rather_than_nan(airli
     from reference.quadrature.ray_values import ReferenceImage
 
     black = np.zeros_like(airlight)
-    data = reference_data(ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
-    json.dumps(data, allow_nan=False)
-    assert data["relative_bound"] is None
-    assert data["missed"] is None
+    found = reference_record(ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
+    json.dumps(asdict(found), allow_nan=False)
+    assert found.relative_bound is None
+    assert found.missed is None

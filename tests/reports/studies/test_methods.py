@@ -70,10 +70,9 @@ def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
 
 
 def test_scaling_that_jumps_ends_with_1(variant, capfd, monkeypatch):
-    monkeypatch.setattr("reports.report.others.scaling_data", lambda name, size, found: found)
-    arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed"]
+    arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed", "--size", "80x60"]
     for jump, status in ((False, 0), (True, 1)):
-        found = growth_record(cliff=jump)
+        found = growth_record(cliff=jump) | {"scene": "sphere-spot"}
         monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, found=found, **options: [found])
         assert printed(capfd, *arguments, status=status)["scaling"] == [found]
 

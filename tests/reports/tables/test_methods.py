@@ -2,11 +2,15 @@
 """Every time stands under its own heading, however the table is drawn, and what is not finite never wins."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
+from reports.data.records import MethodRow, Scene
 from reports.tables.drawing import csv, html, latex, markdown, text
 from reports.tables.methods import COLUMNS, TIMES, fastest_table, methods_table
+from tests.helpers.reports import entry as made
+from tests.helpers.reports import errors, record_of, scene
 
 MEDIANS = {name: 2.0 + place for place, name in enumerate(TIMES)}  # no two alike
 
@@ -16,10 +20,8 @@ def timing(median):
 
 
 def entry(label="a", *, rmse=0.01, frame=2.0, nonfinite=0, **more):
-    error = {"relative_rmse": rmse, "relative_bias": 0.0, "p50": 0.1, "p99": 0.2, "max": 0.3, "nonfinite": nonfinite}
     times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame)}
-    fields = {"label": label, "kind": "built-in", "refused": None, "note": None, "knows_shadows": True, "times": times}
-    return fields | {"error": error} | more
+    return record_of(made(label, times=times, error=errors(rmse, nonfinite=nonfinite)) | more, MethodRow)
 
 
 @pytest.mark.parametrize("name", TIMES)
@@ -51,7 +53,7 @@ def test_a_shader_has_its_device_beside_its_time_and_is_in_no_race_with_others()
 
 def fastest_of(*methods):
     """The cells of the table of the fastest methods for a scene."""
-    (row,) = fastest_table([{"name": "fog", "methods": methods}]).rows
+    (row,) = fastest_table([replace(record_of(scene("fog", []), Scene), methods=methods)]).rows
     return tuple(row.values.values())
 
 
@@ -72,7 +74,7 @@ def test_the_fastest_method_within_each_error_has_a_cell():
         entry("not finite", rmse=1e-5, frame=0.1, nonfinite=3),  # its RMSE leaves out the very pixels that are wrong
         entry("image", kind="image", rmse=1e-5, times=None),
     ],
-    ids=lambda never: never["label"],
+    ids=lambda never: never.label,
 )
 def test_what_has_no_finite_error_or_no_time_is_never_the_fastest(never):
     assert fastest_of(never, entry("best", rmse=0.0009)) == ("fog", *["best: 2 ms, 500 frames/s"] * 2)

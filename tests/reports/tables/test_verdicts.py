@@ -3,9 +3,10 @@
 
 import pytest
 
+from reports.data.records import Agreement, Scaling
 from reports.tables.agreement import verdict
 from reports.tables.scaling import cliffs, scaling_tables
-from tests.helpers.reports import agreement, growth_record
+from tests.helpers.reports import agreement, growth_record, record_of
 
 
 @pytest.mark.parametrize(
@@ -20,12 +21,12 @@ from tests.helpers.reports import agreement, growth_record
 )
 def test_a_truth_is_confirmed_refused_or_not_decided(equivalent, interval, finished, good):
     compared = agreement(equivalent, margin=0.005, finished=finished, relative_bias_ci=interval)
-    assert verdict(compared) is good
+    assert verdict(record_of(compared, Agreement)) is good
 
 
 def test_jumps_are_found():
-    calm, jump = growth_record(), growth_record(cliff=True)
+    calm, jump = (record_of(growth_record(cliff=cliff), Scaling) for cliff in (False, True))
     assert len(cliffs([jump, calm])) == 1
-    costs, exponents = scaling_tables([growth_record(works=(), refused="method x: no")])
+    costs, exponents = scaling_tables([record_of(growth_record(works=(), refused="method x: no"), Scaling)])
     assert costs.rows[0].reason == "refused: method x: no"
     assert exponents.rows == ()

@@ -117,11 +117,11 @@ def test_an_interval_that_holds_both_answers_tells_nothing():
 def test_figures_are_divided_with_their_intervals_and_reasons_stay():
     each = Claim("biri", "eq. 0", "words", "experiment", "a / b", "at least", limit=3.0, unit="times", why="so")
     row = judged(each, {"a": [8.0, 6.0, 10.0], "b": [2.0, 1.0, 3.0]})
-    assert (row["measured"], row["low"], row["high"], row["verdict"]) == (4.0, 2.0, 10.0, "impossible")
-    assert row["why"] == "cannot be told apart, the figure lies between 2 and 10; at least 3: so"
+    assert (row.measured, row.low, row.high, row.verdict) == (4.0, 2.0, 10.0, "impossible")
+    assert row.why == "cannot be told apart, the figure lies between 2 and 10; at least 3: so"
     row = judged(each, {"a": "not measured: too slow", "b": 1.0})
-    assert (row["measured"], row["verdict"], row["why"]) == (None, "impossible", "not measured: too slow")
-    assert judged(each, {"a": float("inf"), "b": 1.0})["verdict"] == "impossible"
+    assert (row.measured, row.verdict, row.why) == (None, "impossible", "not measured: too slow")
+    assert judged(each, {"a": float("inf"), "b": 1.0}).verdict == "impossible"
 
 
 def test_a_stencil_of_one_ray_by_hand():

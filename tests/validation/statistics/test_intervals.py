@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Intervals, p-values, powers and bands of noise hold what they estimate as often as they say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
 
+from reports.data.records import Growth, Times, Timing
 from tests.helpers.calibration import power
-from tests.helpers.reports import sampled, times
+from tests.helpers.reports import record_of, sampled, times
 from validation.statistics.noise import (
     ERROR_TOLERANCE,
     FLOORS,
@@ -131,18 +134,18 @@ def test_the_band_of_an_error_is_relative_plus_rounding():
 
 
 def test_spread_is_the_geometric_mean_of_the_quartiles():
-    wide = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 4.0, "repetitions": 9}
-    quiet = {"median_ms": 1.0, "low_ms": 1.0, "high_ms": 1.0, "repetitions": 9}
+    wide = Timing(median_ms=1.0, low_ms=1.0, high_ms=4.0, repetitions=9)
+    quiet = replace(wide, high_ms=1.0)
     assert spread([{"frame": wide, "airlight": quiet}]) == pytest.approx(2.0)
     # A single repetition, and what is shorter than a launch, say nothing of the machine.
-    assert spread([{"frame": wide | {"repetitions": 1}, "surface": wide | {"median_ms": 0.002}}]) == 1.0
+    assert spread([{"frame": replace(wide, repetitions=1), "surface": replace(wide, median_ms=0.002)}]) == 1.0
     assert spread([]) == 1.0
 
 
 def test_more_work_is_seen_in_all_that_contains_it():
-    old, new = times(1.0), times(1.0)
+    old, new = (record_of(times(1.0), Times).stages for _ in range(2))
     for stage in ("airlight", "frame", "light_moved", "objects_moved"):
-        new[stage] = sampled([old[stage]["median_ms"] + 0.7] * 20)
+        new[stage] = record_of(sampled([old[stage].median_ms + 0.7] * 20), Timing)
     assert slower_stages(old, new, least=1.25, scale=1.0) == ["airlight", "frame"]
     assert slower_stages(old, new, least=1.1, scale=1.0) == ["airlight", "frame", "light_moved", "objects_moved"]
     assert slower_stages(new, old, least=1.1, scale=1.0) == []
@@ -160,5 +163,8 @@ def test_more_work_is_seen_in_all_that_contains_it():
     ],
 )
 def test_another_power_is_beyond_tolerance_and_scatter(old, new, differs):
-    fits = [{"exponent": exponent, "standard_error": error} for exponent, error in (old, new)]
+    fits = [
+        Growth(exponent=exponent, standard_error=error, steepest=None, at=None, cliff=False)
+        for exponent, error in (old, new)
+    ]
     assert other_power(*fits) == pytest.approx(differs)

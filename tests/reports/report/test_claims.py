@@ -3,9 +3,10 @@ import copy
 
 import pytest
 
-from reports.data.claims import claims, confirmed
+from reports.data.records import Agreement
+from reports.report import claims as made
 from reports.tables.agreement import verdict
-from tests.helpers.reports import agreement, checked, entry, report_of, scene
+from tests.helpers.reports import agreement, checked, entry, record_of, report_of, scene
 from tests.helpers.reports import refused as refused_entry
 
 
@@ -18,26 +19,30 @@ def agreed(equivalent, detectable, *, layer="airlight", margin=0.005, estimator=
     return agreement(equivalent, estimator, layer=layer, detectable=detectable, margin=margin)
 
 
+def claims(scenes):
+    return made.claims(checked(report_of(scenes)).scenes)
+
+
+def confirmed(scenes):
+    return made.confirmed(checked(report_of(scenes)).scenes)
+
+
 def texts(scenes):
-    return [claim["text"] for claim in claims(scenes)]
+    return [claim.text for claim in claims(scenes)]
 
 
-SCENES = checked(
-    report_of(
-        [
-            scene(
-                "fog",
-                [method("fast", 0.02, 1.0), method("good", 0.004, 2.0), method("slow", 0.0001, 8.0)],
-                agreement={"airlight": agreed(True, 0.0031)},
-            ),
-            scene(
-                "hall",
-                [method("fast", 0.2, 1.0), method("good", 0.005, 40.0), method("slow", 0.004, 80.0)],
-                agreement={"airlight": agreed(True, 0.0042), "surface": agreed(True, 0.0007, layer="surface")},
-            ),
-        ]
-    )
-)["scenes"]
+SCENES = [
+    scene(
+        "fog",
+        [method("fast", 0.02, 1.0), method("good", 0.004, 2.0), method("slow", 0.0001, 8.0)],
+        agreement={"airlight": agreed(True, 0.0031)},
+    ),
+    scene(
+        "hall",
+        [method("fast", 0.2, 1.0), method("good", 0.005, 40.0), method("slow", 0.004, 80.0)],
+        agreement={"airlight": agreed(True, 0.0042), "surface": agreed(True, 0.0007, layer="surface")},
+    ),
+]
 
 
 def scenes():
@@ -46,7 +51,7 @@ def scenes():
 
 @pytest.mark.claim("claims-follow")
 def test_claims_on_a_truth_that_is_confirmed():
-    assert [(claim["kind"], claim["good"]) for claim in claims(scenes())] == [("reference", True), ("left-out", None)]
+    assert [(claim.kind, claim.good) for claim in claims(scenes())] == [("reference", True), ("left-out", None)]
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
     assert claims([]) == []
 
@@ -70,10 +75,10 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_truth():
     data = scenes()
     data[1]["agreement"]["airlight"] = out_of_time([-0.01, 0.004])
     first = claims(data)[0]
-    assert first["good"] is None
-    assert "confirmed by Mitsuba's volpath in 2 of 3 comparisons" in first["text"]
-    assert "not decided within the time in hall (airlight)" in first["text"]
-    assert "the worst is +0..+0.1 %, in fog (airlight)" in first["text"]  # of those that were decided
+    assert first.good is None
+    assert "confirmed by Mitsuba's volpath in 2 of 3 comparisons" in first.text
+    assert "not decided within the time in hall (airlight)" in first.text
+    assert "the worst is +0..+0.1 %, in fog (airlight)" in first.text  # of those that were decided
     # No other estimator says anything about the airlight of the hall.
     assert not confirmed(data)
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
@@ -83,8 +88,8 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_truth():
 def test_out_of_time_can_still_speak_against_the_truth():
     data = scenes()
     data[1]["agreement"]["airlight"] = out_of_time([0.006, 0.03])
-    assert verdict(data[1]["agreement"]["airlight"]) is False
-    assert "NOT confirmed within 0.5 %" in claims(data)[0]["text"]
+    assert verdict(record_of(data[1]["agreement"]["airlight"], Agreement)) is False
+    assert "NOT confirmed within 0.5 %" in claims(data)[0].text
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
     assert not confirmed(data)
 
@@ -93,6 +98,6 @@ def test_what_failed_is_named_with_its_pixels():
     data = scenes()
     data[0]["methods"][0]["error"] |= {"nonfinite": 3, "negative": 2}
     data[1]["reference"]["left"] = 7
-    failed = [claim for claim in claims(data) if claim["kind"] == "failed"]
-    assert [claim["good"] for claim in failed] == [False] * 3
-    assert all(words in claim["text"] for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed))
+    failed = [claim for claim in claims(data) if claim.kind == "failed"]
+    assert [claim.good for claim in failed] == [False] * 3
+    assert all(words in claim.text for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed))

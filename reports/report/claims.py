@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The claims at the top of a report, a sentence each; every one follows from the numbers of `report.json`.
 
-A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdict, null for what is a fact. The kinds:
+The kinds of claims:
 
-    reference          whether an estimator confirms the reference, with its margin and the worst of its intervals
+    reference      whether an estimator confirms the reference, with its margin and the worst of its intervals
     left-out       the light that single scattering leaves out
     image          the errors of an engine's images
     failed         values that are not finite or negative, lit intervals on which shadow rays disagree
@@ -13,15 +13,16 @@ A claim is {"kind", "text", "good"}: `good` is true or false for what is a verdi
     not-measured   what was left out for its time, HDR-FLIP that could not be computed
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from realtime.methods.shader.source import is_users
+from reports.data.records import Agreement, Claim, MethodRow, Scaling, Scene
 from reports.tables.agreement import verdict, worst_interval
 from reports.tables.methods import published_as
 from reports.tables.scaling import WORK, cliffs
 
-Claim = dict[str, Any]
-Scenes = Sequence[Mapping[str, Any]]
+Scenes = Sequence[Scene]
+Entries = Sequence[tuple[str, MethodRow]]  #: with the names of their scenes
 
 _WORDS = {"volpath": "Mitsuba's volpath", "single-scatter": "our own Mitsuba integrator"}
 
@@ -31,10 +32,10 @@ def claims(scenes: Scenes) -> list[Claim]:
     if not scenes:
         return []
     sentences = [*_trust(scenes), _left_out(scenes), *_images(scenes), *_failed(scenes)]
-    refused = [m for m in _methods(scenes) if m[1]["refused"]]
-    sentences += _listed("refused", "Refused, with the reason in the tables", refused, lambda m: not m.get("left_out"))
+    refused = [m for m in _methods(scenes) if m[1].refused]
+    sentences += _listed("refused", "Refused, with the reason in the tables", refused, lambda m: not m.left_out)
     slow = "Not measured for the time that they take, with the reason in the tables"
-    sentences += _listed("not-measured", slow, refused, lambda m: bool(m.get("left_out")))
+    sentences += _listed("not-measured", slow, refused, lambda m: m.left_out)
     return sentences + _without_flip(scenes)
 
 
@@ -50,67 +51,67 @@ def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
     return [_claim("not-measured", text)]
 
 
-def growth_claims(records: Sequence[Mapping[str, Any]]) -> list[Claim]:
+def growth_claims(records: Sequence[Scaling]) -> list[Claim]:
     """Return the claims that follow from how times grow, the records of `scaling`."""
     if not records:
         return []
     jumps = [_claim("growth", f"A time jumps: {jump}.", good=False) for jump in cliffs(records)]
-    scenes = " and ".join(dict.fromkeys(record["scene"] for record in records))
-    kinds = ", ".join(dict.fromkeys(WORK[record["kind"]] for record in records))
+    scenes = " and ".join(dict.fromkeys(record.scene for record in records))
+    kinds = ", ".join(dict.fromkeys(WORK[record.kind] for record in records))
     return jumps or [_claim("growth", f"No time of a frame of {scenes} jumps as the work grows: {kinds}.", good=True)]
 
 
 def confirmed(scenes: Scenes) -> bool:
     """Return whether no comparison speaks against the reference, and each layer is confirmed by at least one."""
     for scene in scenes:
-        compared = list(scene["agreement"].values())
+        compared = list(scene.agreement.values())
         if any(verdict(entry) is False for entry in compared):
             return False
-        for layer in {entry["layer"] for entry in compared}:
-            if not any(verdict(entry) for entry in compared if entry["layer"] == layer):
+        for layer in {entry.layer for entry in compared}:
+            if not any(verdict(entry) for entry in compared if entry.layer == layer):
                 return False
     return True
 
 
 def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
-    return {"kind": kind, "text": text, "good": good}
+    return Claim(kind=kind, text=text, good=good)
 
 
-def _methods(scenes: Scenes, *, images: bool = False) -> list[tuple[str, Mapping[str, Any]]]:
+def _methods(scenes: Scenes, *, images: bool = False) -> list[tuple[str, MethodRow]]:
     """Return the scene's name with every entry of a method, or with every image of an engine."""
-    entries = [(scene["name"], entry) for scene in scenes for entry in scene["methods"]]
-    return [(name, entry) for name, entry in entries if (entry.get("kind") == "image") == images]
+    entries = [(scene.name, entry) for scene in scenes for entry in scene.methods]
+    return [(name, entry) for name, entry in entries if (entry.kind == "image") == images]
 
 
 def _trust(scenes: Scenes) -> list[Claim]:
     """Return a claim for each estimator that checked the reference."""
-    compared = [(scene["name"], entry) for scene in scenes for entry in scene["agreement"].values()]
+    compared = [(scene.name, entry) for scene in scenes for entry in scene.agreement.values()]
     if not compared:
         text = "There is no light to compare with Mitsuba's volpath: no airlight and no lit surface in any scene."
         return [_claim("reference", text)]
-    estimators = dict.fromkeys(entry["estimator"] for _, entry in compared)
-    return [_verdict(_WORDS[name], [pair for pair in compared if pair[1]["estimator"] == name]) for name in estimators]
+    estimators = dict.fromkeys(entry.estimator for _, entry in compared)
+    return [_verdict(_WORDS[name], [pair for pair in compared if pair[1].estimator == name]) for name in estimators]
 
 
-def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim:
-    against = [f"{name} ({entry['layer']})" for name, entry in compared if verdict(entry) is False]
-    margin = 100 * compared[0][1]["statistics"]["margin"]
+def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
+    against = [f"{name} ({entry.layer})" for name, entry in compared if verdict(entry) is False]
+    margin = 100 * compared[0][1].statistics.margin
     if against:
         text = (
             f"The reference is NOT confirmed within {margin:g} % by {words} in {', '.join(against)}: there the 95 % "
             "interval of the relative bias is not inside the margin."
         )
         return _claim("reference", text, False)
-    open_ = [f"{name} ({entry['layer']})" for name, entry in compared if verdict(entry) is None]
+    open_ = [f"{name} ({entry.layer})" for name, entry in compared if verdict(entry) is None]
     good = [pair for pair in compared if verdict(pair[1])]
     text = ""
     if good:
         name, worst = max(good, key=lambda pair: worst_interval([pair[1]])[1])
-        low, high = (100 * end for end in worst["statistics"]["relative_bias_ci"])
+        low, high = (100 * (end or 0.0) for end in worst.statistics.relative_bias_ci)
         text = (
             f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
             f"of the pooled relative bias lies within ±{margin:g} %; the worst is {low:+.2g}..{high:+.2g} %, in {name} "
-            f"({worst['layer']})."
+            f"({worst.layer})."
         )
     if open_:
         text += (" " if text else "") + (
@@ -121,20 +122,20 @@ def _verdict(words: str, compared: list[tuple[str, Mapping[str, Any]]]) -> Claim
 
 
 def _left_out(scenes: Scenes) -> Claim:
-    shares = "; ".join(f"{scene['name']} {100 * scene['multiple']['medium']['value']:.2g} %" for scene in scenes)
+    shares = "; ".join(f"{scene.name} {100 * scene.multiple.medium.value:.2g} %" for scene in scenes)
     text = f"Every method here scatters once. The fraction of the airlight that this leaves out: {shares}."
     return _claim("left-out", text)
 
 
 def _images(scenes: Scenes) -> Iterator[Claim]:
     for scene, entry in _methods(scenes, images=True):
-        error = entry["error"]
-        if not error or error["relative_rmse"] is None:
+        error = entry.error
+        if not error or error.relative_rmse is None:
             continue
-        what = "total of airlight and surface" if entry["layer"] == "total" else entry["layer"]
+        what = "total of airlight and surface" if entry.layer == "total" else entry.layer
         text = (
-            f"The image {entry['label']} of {scene}, judged by its {what}: relative RMSE "
-            f"{100 * error['relative_rmse']:.3g} %, relative bias {100 * error['relative_bias']:+.3g} %."
+            f"The image {entry.label} of {scene}, judged by its {what}: relative RMSE "
+            f"{100 * error.relative_rmse:.3g} %, relative bias {100 * (error.relative_bias or 0.0):+.3g} %."
         )
         yield _claim("image", text)
 
@@ -149,34 +150,47 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
         peers = [_pixels(name, m, count) for name, m in wrong if published_as(m)]
         if peers:
             yield _claim("published", f"As the papers have it, images with {words}: {'; '.join(peers)}.")
-    left = [
-        f"{scene['name']} ({scene['reference']['left']})" for scene in scenes if scene.get("reference", {}).get("left")
-    ]
+    left = [f"{scene.name} ({scene.reference.left})" for scene in scenes if scene.reference.left]
     if left:
         text = f"Random shadow rays disagree with lit intervals, and were not resolved: {'; '.join(left)} of them."
         yield _claim("failed", text + " They are counted in the bound of the reference.", False)
 
 
-def _pixels(scene: str, m: Mapping[str, Any], count: str) -> str:
-    pixels = m["error"][count]
-    return f"{m['label']} in {scene} ({pixels} pixel{'' if pixels == 1 else 's'})"
+def _pixels(scene: str, m: MethodRow, count: str) -> str:
+    pixels = _count(m, count)
+    return f"{m.label} in {scene} ({pixels} pixel{'' if pixels == 1 else 's'})"
 
 
-def _count(m: Mapping[str, Any], name: str) -> int:
-    return (m["error"] or {}).get(name) or 0
+def _count(m: MethodRow, name: str) -> int:
+    return getattr(m.error, name, 0)
 
 
-def _listed(kind: str, words: str, entries: Sequence[tuple[str, Mapping[str, Any]]], wanted) -> list[Claim]:
-    names = [f"{m['label']} in {name}" for name, m in entries if wanted(m)]
+def _listed(kind: str, words: str, entries: Entries, wanted: Callable[[MethodRow], bool]) -> list[Claim]:
+    names = [f"{m.label} in {name}" for name, m in entries if wanted(m)]
     return [_claim(kind, f"{words}: {'; '.join(names)}.")] if names else []
 
 
 def _without_flip(scenes: Scenes) -> list[Claim]:
     """Return a claim on the images that have no HDR-FLIP, with the reason of the first."""
     everything = _methods(scenes) + _methods(scenes, images=True)
-    without = [(name, m) for name, m in everything if m.get("flip") and m["flip"]["value"] is None]
+    without = [(name, m.label, m.flip.note) for name, m in everything if m.flip and m.flip.value is None]
     if not without:
         return []
-    name, first = without[0]
+    name, label, why = without[0]
     count = f"{len(without)} image{'' if len(without) == 1 else 's'}"
-    return [_claim("not-measured", f"No HDR-FLIP of {count}; of {first['label']} in {name}: {first['flip']['note']}.")]
+    return [_claim("not-measured", f"No HDR-FLIP of {count}; of {label} in {name}: {why}.")]
+
+
+def own_fault(method: str, refused: str | None) -> str | None:
+    """Return what a user method did wrong: what it refuses by name is a result, its faults are not.
+
+    They begin with the name of the method (`realtime.methods.user_method`, `realtime.methods.shader`,
+    `reports.machine.own_process`).
+    """
+    return refused if is_users(method) and refused and refused.startswith(f"method {method}: ") else None
+
+
+def own_faults(methods: Iterable[MethodRow]) -> list[str]:
+    """Return what user methods did wrong, each once."""
+    faults = (own_fault(row.method, row.refused) for row in methods if row.kind == "function")
+    return list(dict.fromkeys(filter(None, faults)))

@@ -1,0 +1,401 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The records of report.json: their fields are its keys, with units and meanings.
+
+`reports.data.reader` makes them of the file and refuses what does not fit their types. Who draws a page, a table or a
+figure, or compares two reports, takes records. What is None is `null` in the file: not known, not measured, not finite.
+Fields with a default came after the first reports of the version.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from validation.columns import column
+from validation.papers.claims import Judged
+
+SCHEMA = "airlight-report/2"
+
+Number = float | None
+Ends = tuple[Number, Number]  #: of an interval
+Size = tuple[int, int]  #: width and height [pixels]
+Files = Mapping[str, str]  #: names relative to the folder of the report, by what they are
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """Two dates."""
+
+    first: str
+    last: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What the study asked for."""
+
+    name: str = column(meaning="`quick`, `default`, `full`, or that of a study of one's own")
+    scenes: tuple[str, ...] = column(meaning="the scenes of the report")
+    image: Size = column(unit="pixels", meaning="width and height of the images")
+    timed: Size = column(unit="pixels", meaning="of the frames that are timed")
+    checked: Size = column(unit="pixels", meaning="of the checks of the reference")
+    margins: Mapping[str, float] = column(meaning="by estimator, the relative bias that counts as agreement")
+    samples: int | Mapping[str, int] = column(meaning="of the checks, by estimator: samples per pixel in a batch")
+    batches: int = column(meaning="of the checks: largest number of batches")
+    multiple: tuple[int, int] = column(meaning="of multiple scattering: batches, and samples per pixel in each")
+    patience: Number = column(unit="s", meaning="after which an undecided estimator is stopped; `null`: never")
+    seconds: float = column(unit="s", meaning="for each timing")
+    slow: Number = column(unit="s", meaning="a frame that takes longer, preparation included, is timed by stages")
+    limit: Number = column(unit="s", meaning="frames that would take longer are not measured; `null`: none")
+    flip: Literal["none", "kinds", "all"] = column(meaning="which get HDR-FLIP; `kinds`: those of `--quick`")
+    rays: int = column(meaning="generated rays for the stability of the kernels; 0: none")
+    scaling: tuple[str, ...] = column(meaning="the kinds of work by whose growth `colonnade` is timed", default=())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Environment:
+    """What made the numbers."""
+
+    versions: Mapping[str, str] = column(meaning="by package")
+    platform: str
+    processor: str
+    threads: int
+    variant: str = column(meaning="Mitsuba's")
+    device: str | None = column(meaning="the GPU, where there is one", default=None)
+    opengl: str | None = column(meaning="that draws shaders, and its error on certified integrals", default=None)
+    llvm: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """A sentence of the page."""
+
+    kind: str = column(
+        meaning="`reference` (whether an estimator confirms it), `left-out` (the fraction that single scattering "
+        "leaves out), `image`, `failed` (values that are not finite or negative, shadow rays that disagree), "
+        "`published` (the same in configurations that reproduce a paper with its errors: no failure), `refused`, "
+        "`growth`, or `not-measured`"
+    )
+    text: str = column(meaning="the sentence")
+    good: bool | None = column(meaning="the verdict; `null` for a fact or an undecided check", default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """The accuracy of the quadrature."""
+
+    mean: Number = column(unit="W/(m^2 sr)", meaning="of the airlight")
+    relative_bound: Number = column(meaning="of its error")
+    transitions: int = column(meaning="edges of lit intervals")
+    missed: Number = column(meaning="fraction of the first shadow rays that disagreed")
+    checked: int = column(meaning="shadow rays that checked the lit intervals")
+    disagreements: int = column(meaning="of these")
+    refined: int = column(meaning="disagreements that were mended")
+    left: int = column(meaning="disagreements that were not: the bound has them")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statistics:
+    """Agreement of two images with standard errors, see `validation.statistics.comparison.Statistics`."""
+
+    masked: int = 0
+    tested: int = 0
+    zero_reference: int = 0
+    zero_reference_error: Number = None
+    zero_variance: int = 0
+    zero_variance_error: Number = None
+    z_mean: Number
+    z_std: Number
+    rejected: int
+    expected_rejections: Number
+    exceeding: int = 0
+    expected_exceeding: Number = None
+    exceeding_p: Number = None
+    blocks: int = 0
+    rejected_blocks: int = 0
+    uniformity_p: Number = None
+    relative_bias: Number
+    relative_bias_ci: Ends
+    relative_bias_ci_batches: Ends | None
+    relative_bias_se: Number = None
+    relative_bias_freedom: Number = None
+    relative_bias_p: Number = None
+    reference_variance_share: Number = None
+    largest_share: Number = None
+    detectable_bias: Number
+    margin: float
+    equivalent: bool | None
+    family_level: Number = None
+    plain_level: Number = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agreement:
+    """A check of the reference."""
+
+    estimator: Literal["single-scatter", "volpath"] = column(meaning="that checks")
+    layer: Literal["airlight", "surface"] = column(meaning="that is checked")
+    width: int = column(unit="pixels")
+    height: int = column(unit="pixels")
+    batches: int = column(meaning="that were traced")
+    samples: int = column(meaning="per pixel in a batch")
+    epsilon: float = column(meaning="of the shadow rays that it was corrected for")
+    masked: int = column(unit="pixels", meaning="left out")
+    statistics: Statistics = column(meaning="the check confirms the reference if it is `equivalent`")
+    uncorrected_bias: Number = column(meaning="relative bias before the correction")
+    finished: bool = column(meaning="whether its intervals became narrow enough; else it may be undecided")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Share:
+    """A fraction of the light, with its 95 % interval."""
+
+    value: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Multiple:
+    """What scatters more than once."""
+
+    medium: Share
+    everything: Share
+    max_depth: int
+    batches: int
+    samples: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """Repeated measurements of one piece of work."""
+
+    median_ms: float = column(unit="ms")
+    low_ms: float = column(unit="ms", meaning="lower quartile")
+    high_ms: float = column(unit="ms", meaning="upper quartile")
+    repetitions: int = column(meaning="that were timed")
+    cpu_ms: Number = column(unit="ms", meaning="least processor time; `null` where stages were timed", default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Times:
+    """The times of a frame and of its stages; of an image the frame alone."""
+
+    frame: Timing
+    airlight: Timing | None = None
+    surface: Timing | None = None
+    light_moved: Timing | None = None
+    objects_moved: Timing | None = None
+    light_moved_camera_cached: Timing | None = None
+    colours_changed: Timing | None = None
+
+    @property
+    def stages(self) -> dict[str, Timing]:
+        """Those that were measured, by name."""
+        return {name: timing for name, timing in vars(self).items() if timing is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """Errors of an image, see `validation.metrics.errors`."""
+
+    pixels: int
+    bias: Number
+    relative_bias: Number
+    rmse: Number
+    relative_rmse: Number
+    p50: Number
+    p99: Number
+    max: Number
+    nonfinite: int
+    negative: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Errors of a method that draws random numbers, over independent runs, see `validation.study.row.RunsError`."""
+
+    runs: int
+    bias: float
+    bias_within: float
+    rmse: float
+    rmse_within: float
+    root_bias: Number
+    most_bias: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flip:
+    """HDR-FLIP."""
+
+    value: Number
+    note: str
+    start_exposure: Number
+    stop_exposure: Number
+    exposures: int | None
+    pixels_per_degree: Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodRow:
+    """What a method costs in a scene and how wrong it is, or the same of an engine's image."""
+
+    label: str = column(meaning="its name in tables")
+    kind: Literal["built-in", "function", "image"] = column(meaning="`function` of a user, `image` of an engine")
+    layer: Literal["airlight", "surface", "total"] = column(meaning="that `error` compares")
+    pixel: Literal["centre", "area"] = column(meaning="of the reference that its pixels fit", default="centre")
+    method: str = column(meaning="of the configuration; `image` for an image")
+    kernel: str | None = column(meaning="of the configuration")
+    knows_shadows: bool = column(meaning="whether it renders volumetric shadows")
+    status: str = column(meaning="`done`, `refused` or `left out`", default="done")
+    note: str | None = column(meaning="how its times or its image differ from those of other methods")
+    device: str | None = column(meaning="that draws a shader and times it; `null` for Dr.Jit", default=None)
+    times: Times | None = column(meaning="of frames, see below; of an image those of its `times.json`")
+    memory: Number = column(unit="MiB", meaning="peak of a frame that prepares everything again", default=None)
+    cost: Mapping[str, float | bool | None] | None = column(
+        meaning="`cost` of the [rows of a sweep](#rows-of-a-sweep); `null` for images", default=None
+    )
+    error: Errors | None = column(meaning="against the reference")
+    noise: Noise | None = column(meaning="of a method that draws random numbers: errors over runs", default=None)
+    surface_error: Errors | None = column(meaning="the same for the lit surface; `null` if there is none")
+    flip: Flip | None = column(meaning="HDR-FLIP of all light, or why there is none; `null` if not asked for")
+    parameters: Mapping[str, float | bool | str] = column(meaning="of the configuration")
+    refused: str | None = column(meaning="why there is no frame; `null` if there is one")
+    left_out: bool = column(meaning="whether the time was the only reason for `refused`")
+    files: Files = column(meaning="`exr`, `picture`, `error` (a picture of the signed relative error)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Method(MethodRow):
+    """A row of a report, and when it was measured."""
+
+    measured: str = column(meaning="date of the measurement")
+    seconds: float = column(unit="s", meaning="that it took")
+    cached: bool = column(meaning="whether an earlier run made it")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneFiles:
+    """The files of a reference: an EXR, a picture of all light and one of the airlight alone."""
+
+    exr: str
+    picture: str
+    airlight: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """What was measured in a scene."""
+
+    name: str = column(meaning="of the scene")
+    purpose: str = column(meaning="what it is for")
+    published: str = column(meaning="the published figure that it stands for")
+    path: str | None = column(meaning="of a user's file")
+    size: Size = column(unit="pixels", meaning="width and height of its images")
+    timed: Size = column(unit="pixels", meaning="of the frames that are timed")
+    plan: Mapping[str, str] = column(meaning="the features of the scene in words")
+    notes: tuple[str, ...] = column(meaning="remarks for the reader")
+    reference: Reference = column(meaning="the accuracy of the quadrature")
+    exposure: float = column(meaning="the factor before the tone curve of all pictures of the scene")
+    agreement: Mapping[str, Agreement] = column(meaning="checks of the reference, by name as `volpath airlight`")
+    multiple: Multiple = column(meaning="fraction of the airlight, and of all light, that scatters more than once")
+    files: SceneFiles = column(meaning="of the reference: `exr`, `picture`, `airlight` (a picture of it alone)")
+    methods: tuple[Method, ...] = column(meaning="what methods and images cost, and how wrong they are")
+    seconds: Mapping[str, float] = column(unit="s", meaning="that its parts took when they were computed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class KernelErrors:
+    """Relative errors of a kernel on a group of rays, see `validation.kernels.errors`."""
+
+    rays: int
+    refused: int
+    median: Number
+    p99: Number
+    max: Number
+    mean: Number
+    nan: int
+    infinite: int
+    negative: int
+    worst: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rays:
+    """Errors of a kernel on a set of rays, by group; `all` are all of them."""
+
+    name: str
+    columns: str
+    single: Mapping[str, KernelErrors]
+    double: Mapping[str, KernelErrors]
+    single_against_double: Mapping[str, KernelErrors]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kernel:
+    """Where a kernel breaks, see `validation.kernels.stability`."""
+
+    kernel: str
+    exact: bool
+    refused: Mapping[str, str]
+    sets: tuple[Rays, ...]
+    gamma: Mapping[str, Any]
+    broken: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """What a frame takes at one step of growing work."""
+
+    work: float
+    frame: Timing
+    light_moved: Timing
+    objects_moved: Timing
+    rays: Timing
+    memory: Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Growth:
+    """How a time grows, see `validation.study.growth`."""
+
+    exponent: Number
+    standard_error: Number
+    steepest: Number
+    at: Number
+    cliff: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scaling:
+    """What a method costs as one kind of work grows."""
+
+    scene: str = column(meaning="of the study")
+    size: Size = column(unit="pixels", meaning="of its images")
+    label: str = column(meaning="the method")
+    kind: Literal["size", "triangles", "lights", "media", "map"] = column(meaning="what grows")
+    costs: tuple[Cost, ...] = column(meaning="by step: the `work`, times of frames and of the camera `rays` alone")
+    growth: Mapping[str, Growth] = column(
+        meaning="of a time by name: `exponent` of the fit time ~ work^exponent, its `standard_error`, the `steepest` "
+        "between two steps, the work `at` the second, and whether that is a `cliff`"
+    )
+    refused: str | None = column(meaning="why the steps end early; `null` if all were made")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """The content of report.json."""
+
+    schema: str = column(meaning="the schema and its version")
+    created: str = column(meaning="date and time of the report")
+    command: str = column(meaning="the command line that reproduces it")
+    seconds: float = column(unit="s", meaning="of the measurements in this run, without drawing the page")
+    parts: Mapping[str, float] = column(unit="s", meaning="of this run: `scenes`, `stability`, `scaling`, `papers`")
+    cached: int = column(meaning="number of results that an earlier run computed")
+    computed: int = column(meaning="number of results that this run computed")
+    measured: Measured | None = column(meaning="when the oldest and the newest result were; `null` without any")
+    settings: Settings = column(meaning="what the study asked for")
+    environment: Environment = column(meaning="what made the numbers: versions, processor, variant, LLVM or device")
+    claims: tuple[Claim, ...] = column(meaning="the sentences of the page")
+    scenes: tuple[Scene, ...] = column(meaning="what was measured, by scene")
+    stability: tuple[Kernel, ...] = column(meaning="by kernel, where it breaks; empty with `--quick`")
+    scaling: tuple[Scaling, ...] = column(meaning="how times grow with the work; empty without `--full`", default=())
+    papers: tuple[Judged, ...] = column(meaning="claims of papers, as `airlight paper` prints them", default=())
