@@ -8,7 +8,11 @@ N steps of a ray of the depth T in clouds end at
     tau_k = -s log(1 - (k/N) (1 - exp(-T/s))),        k = 1 .. N,        tau_N = T:
 
 equal shares of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own extinction; light that
-is extinguished less on its way in than on the way out needs nodes further in, so that s is larger.
+is extinguished less on its way in than on the way out needs nodes further in, so that s is larger. From a node at the
+depth tau the next is -s log(1 - exp(tau/s) (1 - exp(-T/s))/N) away.
+
+In a grid of densities T is the depth that the ray had if they were 1 everywhere, and the next node is at most so far
+away at full density. No step is longer than those of `realtime.clouds.march`, which see the voxels.
 
 **The opacity of clouds along a ray.**
 
@@ -22,7 +26,8 @@ Printed is (Bouthors 2008, eq. 2)
 
 Its sign is wrong: it integrates exp(-kappa x), which falls. It is a length, since the factor kappa is missing, and each
 exponent has the local kappa times the whole distance instead of the depth cumulated up to there. As printed the opacity
-is negative, and more light comes out than went in; x is counted from where the ray enters the first cloud.
+is negative, and more light comes out than went in; x is counted from where the ray enters the first cloud. In a grid
+kappa is that in the middle of a step.
 
 **Single scattering in clouds, by steps on which the legs of the light are linear.**
 
@@ -52,31 +57,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import (
-    CloudSurfaces,
-    Crossing,
-    Stretches,
-    first_stretches,
-    next_stretches,
-    optical_depths,
-)
+from realtime.clouds.bounds import CloudSurfaces, Crossing, next_crossing, optical_depths
+from realtime.clouds.march import OPAQUE, SPREAD, depths_along, least, march, middle_density, voxel
 from realtime.numerics.array_types import PerRay, chosen_value
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 
-SPREAD = 2.0  #: s
-_LEAST = 1e-30  # of the logarithm's argument: the last node is the end of the ray
-
-
-def node_share(total, steps: int):
-    """Return (1 - exp(-T/s))/N of rays of the depth `total` in so many `steps`."""
-    return (1 - dr.exp(-total / SPREAD)) / steps
-
-
-def node_depth(number, steps: int, share):
-    """Return tau_k of a `number` k [1], of `steps` N with their `share`; infinite from the last one on."""
-    depth = -SPREAD * dr.log(dr.maximum(1 - type(share)(number) * share, _LEAST))
-    return dr.select(number >= steps, dr.inf, depth)
+_SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
 
 
 def opacity_of(depths: tuple[Any, ...], Color) -> Any:
@@ -86,10 +73,6 @@ def opacity_of(depths: tuple[Any, ...], Color) -> Any:
         dr.select(depth < 0.1, 2 * dr.exp(-0.5 * depth) * dr.sinh(0.5 * depth), 1 - dr.exp(-depth)) for depth in depths
     ]
     return Color(*shares)
-
-
-_BETWEEN = -1.0  # in place of a distance, between two stretches
-_SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
 
 
 @dataclass(frozen=True)
@@ -103,7 +86,6 @@ class CloudRays:
     end: Any  #: distance to the visible surface, infinite where there is none [m]
     depths: tuple[Any, ...]  #: optical depth up to there, by channel [1]
     first: Crossing
-    stretches: Stretches  #: the first ones
 
 
 @dataclass(frozen=True)
@@ -119,91 +101,99 @@ class Beam:
     lit: Callable[[Any, Any], Any] | None
 
 
-def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end) -> CloudRays:
-    """Return rays with their depths; arguments as of `realtime.clouds.bounds.first_stretches`.
+def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> CloudRays:
+    """Return rays with their depths.
 
     `surfaces` and `clouds` are the boundaries and what fills them, `origin` [m] and unit `direction` the rays, `end`
-    may be infinite [m].
+    may be infinite [m]; `stride` is the longest step in a grid where a ray enters [voxels].
     """
-    first, stretches, depths = first_stretches(surfaces, clouds, origin, direction, end)
-    return CloudRays(surfaces, clouds, origin, direction, end, depths, first, stretches)
+    first = next_crossing(surfaces, origin, direction, dr.zeros(type(direction.x), dr.width(direction)))
+    depths = depths_along(surfaces, clouds, origin, direction, end, stride=stride, seen=True)
+    return CloudRays(surfaces, clouds, origin, direction, end, depths, first)
 
 
-def exact_leg(surfaces: CloudSurfaces, clouds: Clouds, light: Light) -> Callable[[Any, Any], tuple[Any, ...]]:
-    """Return the function from points [m] and active lanes to the depths of the legs from a light, by cast rays."""
-    return lambda point, active: optical_depths(surfaces, clouds, point, -light.axis, type(point.x)(dr.inf), active)
-
-
-def scattered(
-    rays: CloudRays, beams: Sequence[Beam], *, steps: int, printed: bool = False
+def light_once(
+    rays: CloudRays, beams: Sequence[Beam], *, steps: int, stride: Any, printed: bool = False
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
 
-    `rays`: rays through clouds; `beams`: the lights; `steps`: N of `realtime.clouds.single_scattering`, in a
-    ray; a stretch in a cloud has one more; `printed`: whether to sum what the paper prints.
+    `rays`: rays through clouds; `beams`: the lights; `steps`: N of `realtime.clouds.single_scattering`, in a ray; a
+    stretch in a cloud has one more; `stride`: the longest step in a grid where a ray enters [voxels]; `printed`:
+    whether to sum what the paper prints.
 
     Valid for any extinction and thickness; `steps` is at least 1.
 
-    Bouthors, Neyret, Max, Bruneton, Crassin 2008, section 6.2.
+    Bouthors, Neyret, Max, Bruneton, Crassin 2008, sections 6.2 and 8.
     """
     clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)
     channels, lanes = len(clouds.sigma_t), dr.width(rays.direction)
-    mean_depth = sum(rays.depths) / channels
+    full = rays.depths
+    if clouds.density is not None:
+        full = optical_depths(rays.surfaces, clouds, rays.origin, rays.direction, rays.end)
+    mean = sum(full) / (channels * SPREAD)
+    # Of thin clouds rounding leaves nothing of 1 - exp(-T): it is never below the first two terms of its series.
+    share = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) / steps
 
-    share = node_share(mean_depth, steps)
+    def step(total, x, cloud, inside):
+        depths, *_ = total
+        kappa = sum(dr.gather(Float, own, cloud, inside) for own in clouds.sigma_t) / channels
+        growth = dr.exp(dr.minimum(sum(depths) / channels, OPAQUE) / SPREAD)
+        part = share * growth
+        ahead = SPREAD * dr.maximum(part, -dr.log(dr.maximum(1 - part, 1e-30)))
+        node = dr.select((part < 1) & (kappa > 0), ahead / kappa, dr.inf)
+        return dr.minimum(node, stride * voxel(clouds, cloud, inside) * growth)
 
-    def march(stretches, *before):
-        """Return the state at the end of the stretches that are kept."""
-
-        def body(place, x, number, depths, legs, shares, sums, going):
-            begin, edge, cloud = stretches.chosen(place)
-            opens = x < 0
-            steps_on = ~opens
-            sigma_t = tuple(dr.gather(Float, own, cloud, going) for own in clouds.sigma_t)
-            mean_sigma, mean_before = sum(sigma_t) / channels, sum(depths) / channels
-            ahead = (node_depth(number, steps, share) - mean_before) / mean_sigma
-            reach = dr.select(mean_sigma > 0, dr.maximum(ahead, 0), dr.inf)
-            to_edge = x + reach >= edge
-            target = dr.select(opens, begin, dr.select(to_edge, edge, x + reach))
-            length = dr.select(opens, 0, target - x)
-            after = tuple(dr.fma(sigma, length, depth) for sigma, depth in zip(sigma_t, depths))
-            new_legs, new_shares = reaching(rays, beams, target, going)
-            own = tuple(sigma * length for sigma in sigma_t)
-            lit = tuple(0.5 * (old + new) for old, new in zip(shares, new_shares))
-            sums = with_step(
-                clouds, beams, sums, own, (depths, after), (legs, new_legs), lit, cloud, steps_on, printed=printed
-            )
-            closes = steps_on & to_edge
-            number = dr.select(steps_on & ~to_edge, number + 1, number)
-            place = dr.select(closes, place + 1, place)
-            x = dr.select(closes, _BETWEEN, target)
-            going = going & (place < stretches.count)  # `&=` would change the mask of the loop around this one
-            return place, x, number, after, new_legs, new_shares, sums, going
-
-        return dr.while_loop(state=before, cond=lambda *state: state[-1], body=body)
-
-    def more(fields, number, depths, legs, shares, sums, going):
-        stretches = Stretches(*fields)
-        start = dr.zeros(mi.UInt32, lanes), dr.full(Float, _BETWEEN, lanes)
-        _, _, *state, _ = march(stretches, *start, number, depths, legs, shares, sums, going)
-        stretches = next_stretches(rays.surfaces, rays.origin, rays.direction, rays.end, stretches)
-        return stretches.fields, *state, going & (stretches.count > 0)
+    def add(total, begin, end, cloud, inside):
+        depths, legs, lit, sums = total
+        next_legs, next_lit = reaching(rays, beams, end, inside)
+        rho = middle_density(clouds, rays.origin, rays.direction, begin, end, cloud, inside)
+        length = dr.select(inside, rho * (end - begin), 0)
+        own = tuple(dr.gather(Float, sigma_t, cloud, inside) * length for sigma_t in clouds.sigma_t)
+        after = tuple(depth + part for depth, part in zip(depths, own))
+        shown = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
+        ends = (depths, after), (legs, next_legs)
+        # Where a stretch begins, so do the legs.
+        sums = with_step(clouds, beams, sums, own, *ends, shown, cloud, inside & (end > begin), printed=printed)
+        legs = tuple(
+            tuple(dr.select(inside, new, old) for new, old in zip(*pair)) for pair in zip(next_legs, legs, strict=True)
+        )
+        lit = tuple(dr.select(inside, new, old) for new, old in zip(next_lit, lit, strict=True))
+        return (after, legs, lit, sums), least(after) < OPAQUE
 
     def zeros(count: int):
         return tuple(dr.zeros(Float, lanes) for _ in range(count))
 
-    sums = tuple(tuple(dr.zeros(Color, lanes) for _ in beam.scales) for beam in beams)
-    state = (
-        rays.stretches.fields,
-        dr.full(mi.UInt32, 1, lanes),
-        zeros(channels),
-        tuple(zeros(channels) for _ in beams),
-        tuple(dr.full(Float, 1, lanes) for _ in beams),
-        sums,
-        (mean_depth > 0) & (rays.stretches.count > 0),
-    )
-    *_, sums, _ = dr.while_loop(state=state, cond=lambda *state: state[-1], body=more)
+    nothing = tuple(tuple(dr.zeros(Color, lanes) for _ in beam.scales) for beam in beams)
+    total = zeros(channels), tuple(zeros(channels) for _ in beams), zeros(len(beams)), nothing
+    *_, sums = march(rays.surfaces, rays.origin, rays.direction, rays.end, total, step=step, add=add)
     return finished(clouds, beams, sums)
+
+
+def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> Any:
+    """Return what is printed for the opacity of clouds, a colour [m]; arguments as of `depths_along`.
+
+    Bouthors, Neyret, Max, Bruneton, Crassin 2008, eq. 2.
+    """
+    Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
+
+    def add(total, begin, finish, cloud, inside):
+        first, sums = total
+        rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside)
+        kappas = [dr.gather(Float, sigma_t, cloud, inside) * rho for sigma_t in clouds.sigma_t]
+        first = dr.select(inside & ~dr.isfinite(first), begin, first)
+        near, far = (dr.select(inside, place - first, 0) for place in (begin, finish))
+        terms = [
+            dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
+            for kappa in kappas
+        ]
+        return (first, tuple(own + term for own, term in zip(sums, terms))), inside
+
+    def step(total, x, cloud, inside):
+        return stride * voxel(clouds, cloud, inside)
+
+    nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+    _, sums = march(surfaces, origin, direction, end, nothing, step=step, add=add)
+    return Color(*(sums * (3 // len(sums))))
 
 
 def reaching(rays: CloudRays, beams: Sequence[Beam], x, active) -> tuple[Any, Any]:

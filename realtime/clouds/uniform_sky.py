@@ -41,7 +41,6 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.bounds import next_crossing
 from realtime.clouds.canonical.coordinates import slab_phase
 from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.order_layers import FIRST_ORDERS, ORDER_LAYERS
@@ -174,7 +173,7 @@ def sky_light(known: SkyEscapes, light: Light, rays: CloudRays, visible: Visible
     [m], light) -> whether no opaque shape is between them; None where nothing casts a shadow.
     """
     Float, Color = type(rays.direction.x), type(light.sky)
-    first = next_crossing(rays.surfaces, rays.origin, rays.direction, dr.zeros(Float, dr.width(rays.direction)))
+    first = rays.first
     mu = dr.select(first.leaves, 1, dr.minimum(dr.abs(dr.dot(first.normal, rays.direction)), 1))
     by_channel = []
     for channel in range(3):

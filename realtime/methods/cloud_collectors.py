@@ -28,6 +28,7 @@ Bouthors, Neyret, Max, Bruneton, Crassin 2008, *Interactive multiple anisotropic
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -39,15 +40,7 @@ from realtime.clouds.canonical.coordinates import SETS, share_of_peak, slab_phas
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
-from realtime.clouds.hypertexture.light_depths import (
-    LightDepths,
-    depths_memory,
-    leg_by_depths,
-    leg_through,
-    sun_depths,
-)
-from realtime.clouds.hypertexture.lit_surface import dense_surface, lit_dense_surface
-from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
+from realtime.clouds.light_depths import LightDepths, depths_memory, sun_depths
 from realtime.clouds.light_maps import (
     LightMap,
     filtered_map,
@@ -56,8 +49,19 @@ from realtime.clouds.light_maps import (
     maps_memory,
     shade,
 )
+from realtime.clouds.lit_surface import dense_surface, lit_dense_surface
+from realtime.clouds.march import leg_by_lengths, leg_through
 from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
-from realtime.clouds.single_scattering import Beam, CloudRays, cloud_rays, light_on_surfaces, opacity_of, sky_behind
+from realtime.clouds.single_scattering import (
+    Beam,
+    CloudRays,
+    cloud_rays,
+    light_on_surfaces,
+    light_once,
+    opacity_as_printed,
+    opacity_of,
+    sky_behind,
+)
 from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.memory import check_memory
 from realtime.methods.interface.method import Layers, Method, View, tolerance
@@ -311,9 +315,8 @@ def _rays(view: View, state: CloudState, parameters: CloudCollectors) -> tuple[C
     clouds = _as_dense(view.medium.clouds, parameters)
     thin = _without_peak(clouds, state)
     both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
-    rays = cloud_rays(state.surfaces, both, view.origin, view.direction, view.distance)
+    rays = cloud_rays(state.surfaces, both, view.origin, view.direction, view.distance, stride=state.stride)
     channels = len(clouds.sigma_t)
-    rays = with_densities(rays, state.stride)
     thin_rays = replace(rays, clouds=thin, depths=rays.depths[channels:])
     return replace(rays, clouds=clouds, depths=rays.depths[:channels]), thin_rays
 
@@ -391,16 +394,11 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int) -> Beam:
     light, sun = view.lights[number], state.maps[number]
     Float = type(view.distance)
     assert sun is not None
-
-    def by_map(point, active):
-        depths = [Float(0) for _ in clouds.sigma_t]
-        for cloud in range(dr.width(clouds.phase)):
-            length = length_along_light(sun.of_cloud(mi.UInt32(cloud)), point, active)
-            kappas = (dr.gather(Float, sigma_t, mi.UInt32(cloud)) for sigma_t in clouds.sigma_t)
-            depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
-        return tuple(depths)
-
-    leg = leg_by_depths(clouds, state.depths[number]) if state.depths else by_map
+    maps = [sun.of_cloud(mi.UInt32(cloud)) for cloud in range(dr.width(clouds.phase))]
+    lengths: list[Any] = [partial(length_along_light, of_cloud) for of_cloud in maps]
+    if state.depths:
+        lengths = [of_cloud.at for of_cloud in state.depths[number]]
+    leg = leg_by_lengths(clouds, lengths)
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     cosine = -dr.dot(view.direction, light.axis)
     return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), leg, lit)

@@ -18,20 +18,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces, sum_over_stretches
-from realtime.clouds.hypertexture.light_depths import LightDepths, leg_by_depths, leg_through, sun_depths
-from realtime.clouds.hypertexture.scattered import light_once, opacity_as_printed, with_densities
+from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
+from realtime.clouds.light_depths import LightDepths, sun_depths
+from realtime.clouds.march import leg_by_lengths, leg_through
 from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
-from realtime.clouds.single_scattering import Beam, cloud_rays, exact_leg, light_on_surfaces, opacity_of, sky_behind
+from realtime.clouds.single_scattering import Beam, cloud_rays, light_on_surfaces, light_once, opacity_of, sky_behind
 from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
 from realtime.methods.interface.method import Layers, Method, View
 from realtime.parameters import parameter
-from realtime.scene.density import Density
-from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 from realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
 from realtime.scene.read_scene import Scene
@@ -83,8 +80,6 @@ class CloudOctaves(Method):
         wanted="scene, isotropic, hg:G or hg-draine:DIAMETER",
     )
     steps: int = parameter(32, "steps of every ray", least=1)
-    light_steps: int = parameter(0, "samples of the density on a leg, as engines take; 0: its exact depth", least=0)
-    light_reach: float = parameter(0.0, "how far these samples go; 0: through all clouds", least=0, unit="m")
     stride: float = parameter(
         1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
     )
@@ -93,8 +88,6 @@ class CloudOctaves(Method):
         "the light of a sky, the same from everywhere, or octaves of a beam from above of pi times its radiance",
         choices=("uniform", "beams"),
     )
-    single: str = parameter("corrected", "equation 1 of Bouthors 2008", choices=("corrected", "printed"))
-    opacity: str = parameter("corrected", "equation 2 of Bouthors 2008", choices=("corrected", "printed"))
 
     def preparation(self, scene):
         """Return what makes the state of a frame."""
@@ -114,7 +107,6 @@ class OctaveState:
     contribution: Any
     anisotropy: Any
     means: Any  #: by phase function of the clouds, its mean cosine [1]
-    reach: Any  #: how far samples on a leg go [m]
     stride: Any  #: longest step through a grid of densities [voxels]
     depths: tuple[tuple[LightDepths, ...], ...] = ()  #: by light and cloud, where clouds have densities
     escapes: SkyEscapes | None = None  #: where there is a sky that is no beam
@@ -126,10 +118,6 @@ def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], Oc
     assert clouds is not None  # `realtime.frame.renderer` refuses the others
     Float = type(scene.camera.origin.x)
     means = [mean_cosine(phase, Float) for phase in _phases(clouds, parameters, Float)]
-    box = mi.ScalarBoundingBox3f()
-    for shape in scene.boundaries:
-        box.expand(shape.bbox())
-    size = float(np.linalg.norm(np.array(box.max) - np.array(box.min)))
     uniform = len(beams_of(scene.lights, parameters.sky, clouds)) < len(scene.lights)
     state = OctaveState(
         cloud_surfaces(scene),
@@ -137,12 +125,11 @@ def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], Oc
         contribution=dr.opaque(Float, parameters.contribution),
         anisotropy=dr.opaque(Float, parameters.anisotropy),
         means=Float(means),
-        reach=dr.opaque(Float, parameters.light_reach or size),
         stride=dr.opaque(Float, parameters.stride),
         escapes=sky_escapes(scene) if uniform else None,
     )
     dr.make_opaque(state.means)
-    if clouds.density is None or parameters.light_steps:
+    if clouds.density is None:
         return lambda now: state
 
     def with_depths(now: Scene) -> OctaveState:
@@ -156,12 +143,10 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
     clouds, surfaces = view.medium.clouds, state.surfaces
     assert clouds is not None
     Color = type(clouds.albedo)
-    rays = with_densities(cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance), state.stride)
+    rays = cloud_rays(surfaces, clouds, view.origin, view.direction, view.distance, stride=state.stride)
     suns = beams_of(view.lights, parameters.sky, clouds)
     beams = [_beam(view, state, number, parameters) for number in suns]
-    by_light = light_once(
-        rays, beams, steps=parameters.steps, stride=state.stride, printed=parameters.single == "printed"
-    )
+    by_light = light_once(rays, beams, steps=parameters.steps, stride=state.stride)
     by_octave = [sum(own) for own in zip(*by_light)]
     amount, amounts = type(view.distance)(1), []
     for radiance in by_octave:
@@ -172,10 +157,7 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
         if state.escapes is not None and number not in suns:
             of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
             parts += zip(ORDER_LAYERS, of_sky)
-    if parameters.opacity == "printed":
-        opacity = opacity_as_printed(surfaces, clouds, view.origin, view.direction, view.distance, stride=state.stride)
-    else:
-        opacity = opacity_of(rays.depths, Color)
+    opacity = opacity_of(rays.depths, Color)
     extra: dict[str, Any] = {}
     if view.extra_layers:
         for name, radiance in parts:
@@ -225,48 +207,8 @@ def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctaves)
             own = tuple(HenyeyGreenstein(sharp * mean) for mean in means)
             sharp = sharp * state.anisotropy
         phases.append(tuple(phase.evaluate(cosine) for phase in own))
-    leg = leg_by_depths(clouds, state.depths[number]) if state.depths else exact_leg(surfaces, clouds, light)
-    if parameters.light_steps:
-        leg = _sampled_leg(state, clouds, light, parameters.light_steps)
+    leg = leg_through(surfaces, clouds, light, stride=state.stride)
+    if state.depths:
+        leg = leg_by_lengths(clouds, [of_cloud.at for of_cloud in state.depths[number]])
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     return Beam(light.intensity, tuple(scales), tuple(phases), leg, lit)
-
-
-def _sampled_leg(state: OctaveState, clouds: Clouds, light: Light, steps: int):
-    """Return legs by samples of the density in the middles of equal steps, as a march through a grid takes them."""
-
-    def leg(point, active):
-        Float, origin = type(point.x), point
-        step = state.reach / steps
-
-        def samples_before(x):
-            return dr.minimum(dr.ceil(x / step - 0.5), steps)
-
-        def add(depths, begin, end, cloud, inside):
-            if clouds.density is None:
-                length = dr.select(inside, step * (samples_before(end) - samples_before(begin)), 0)
-            else:
-                place = origin, samples_before(begin), samples_before(end)
-                length = step * _sum_of_samples(clouds.density, *place, -light.axis * step, cloud, inside)
-            kappas = (dr.gather(Float, sigma_t, cloud, inside) for sigma_t in clouds.sigma_t)
-            return tuple(dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths))
-
-        nothing = tuple(dr.zeros(Float, dr.width(point)) for _ in clouds.sigma_t)
-        return sum_over_stretches(state.surfaces, point, -light.axis, Float(dr.inf), nothing, add, active)
-
-    return leg
-
-
-def _sum_of_samples(density: Density, origin, first, last, step, cloud, inside):
-    """Return the sum of the densities at the samples of a leg from one number to before another."""
-
-    def add(number, total):
-        rho = density.at(origin + step * (number + 0.5), cloud, inside)
-        return number + 1, total + rho
-
-    _, total = dr.while_loop(
-        state=(+first, dr.zeros(type(first), dr.width(origin))),
-        cond=lambda number, total: inside & (number < last),
-        body=add,
-    )
-    return total

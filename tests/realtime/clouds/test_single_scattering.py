@@ -6,10 +6,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds import bounds
 from realtime.clouds.bounds import cloud_surfaces, optical_depths
-from realtime.clouds.hypertexture.scattered import opacity_as_printed
-from realtime.clouds.single_scattering import Beam, cloud_rays, exact_leg, opacity_of, scattered
+from realtime.clouds.march import leg_through
+from realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_as_printed, opacity_of
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
@@ -74,11 +73,11 @@ def device(array):
 def marched(scene, origin, direction, *, steps, scales=(1.0,), printed=False):
     read = read_scene(scene)
     surfaces, clouds = cloud_surfaces(read), read.medium.clouds
-    path = cloud_rays(surfaces, clouds, device(origin), device(direction), mi.Float(dr.inf))
-    leg = exact_leg(surfaces, clouds, read.lights[0])
+    path = cloud_rays(surfaces, clouds, device(origin), device(direction), mi.Float(dr.inf), stride=None)
+    leg = leg_through(surfaces, clouds, read.lights[0], stride=None)
     ones = tuple((mi.Float(1),) for _ in scales)
     beam = Beam(mi.Color3f(1), tuple(mi.Float(scale) for scale in scales), ones, leg, None)
-    (octaves,) = scattered(path, [beam], steps=steps, printed=printed)
+    (octaves,) = light_once(path, [beam], steps=steps, stride=1, printed=printed)
     dr.eval(octaves)
     return [np.array(octave, dtype=np.float64).T for octave in octaves]
 
@@ -97,22 +96,6 @@ def test_order_one_with_64_steps(few):
     origin, direction, expected = few
     (radiance,) = marched(loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED)), origin, direction, steps=64)
     assert np.sqrt(np.mean((radiance - expected) ** 2)) < 0.005 * expected.mean()
-
-
-def test_stretches_that_are_not_kept_are_found_again(monkeypatch):
-    """Rays cross the ring twice: with one kept stretch the other is looked for after the first was marched."""
-    random = np.random.default_rng(5)
-    ends = random.uniform(-130, 130, (2, 300, 3))
-    direction = ends[1] - ends[0]
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    origin = ends[0] - 500 * direction
-    assert np.count_nonzero([len(crossings(ring(), *ray)[0]) > 2 for ray in zip(origin, direction)]) > 10
-    scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
-    images = []
-    for kept in (1, 9):
-        monkeypatch.setattr(bounds, "KEPT", kept)
-        images += marched(scene, origin, direction, steps=8)
-    np.testing.assert_array_equal(*images)
 
 
 def opacity(surfaces, clouds, *rays):
@@ -141,7 +124,7 @@ def test_equations_as_printed_have_the_wrong_sign(few):
     read = read_scene(scene)
     path = device(origin), device(direction), mi.Float(dr.inf)
     surfaces = cloud_surfaces(read)
-    length = np.array(opacity_as_printed(surfaces, read.medium.clouds, *path, stride=None)).T
+    length = np.array(opacity_as_printed(surfaces, read.medium.clouds, *path, stride=1)).T
     one_stretch = [len(crossings(ring(), *ray)[0]) <= 2 for ray in zip(origin, direction)]
     share = np.array(opacity(surfaces, read.medium.clouds, *path)).T
     assert length[one_stretch] == pytest.approx(-share[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)

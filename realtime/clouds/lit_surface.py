@@ -24,8 +24,8 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.clouds.bounds import CloudSurfaces
-from realtime.clouds.hypertexture.march import march, middle_density, voxel
 from realtime.clouds.light_maps import LitSurfaces
+from realtime.clouds.march import march, middle_density, voxel
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 from realtime.shadow_maps.shadow_map import check_size, texel_rays
@@ -54,7 +54,7 @@ def dense_surface(
     """Return where rays first meet more than a density.
 
     `surfaces`, `clouds`, `origin`, `direction`, `end`, `stride`: as for
-    `realtime.clouds.hypertexture.march.marched_depths`; `threshold`: rho_0 [1]; `only`: the number of a cloud that is
+    `realtime.clouds.march.depths_along`; `threshold`: rho_0 [1]; `only`: the number of a cloud that is
     seen alone, with what the rays meet behind its surface; None for all, where rays end at the surface.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
@@ -68,21 +68,19 @@ def dense_surface(
         distance, number, behind = total
         own = inside if only is None else inside & (cloud == only)
         searches = own & ~dr.isfinite(distance)
-        # A cloud without a grid has steps as long as a stretch, which may be endless for a ray within rounding of one.
-        far = dr.select(dr.isfinite(finish), finish, begin)
         first = density.at(origin + direction * begin, cloud, searches)
-        second = density.at(origin + direction * far, cloud, searches)
+        second = density.at(origin + direction * finish, cloud, searches)
         at_once = searches & (first > threshold)
         passes = searches & ~at_once & (second > threshold)
         share = dr.select(passes, (threshold - first) / (second - first), 0)
         met = at_once | passes
-        distance = dr.select(met, begin + share * (far - begin), distance)
+        distance = dr.select(met, begin + share * (finish - begin), distance)
         number = dr.select(met, cloud, number)
         if only is None:
             return (distance, number, behind), inside & ~met
-        rho = middle_density(clouds, origin, direction, begin, far, cloud, own)
+        rho = middle_density(clouds, origin, direction, begin, finish, cloud, own)
         counted = own & dr.isfinite(distance)
-        behind += dr.select(counted, rho * (far - dr.maximum(begin, dr.select(counted, distance, 0))), 0)
+        behind += dr.select(counted, rho * (finish - dr.maximum(begin, dr.select(counted, distance, 0))), 0)
         return (distance, number, behind), inside
 
     total = (

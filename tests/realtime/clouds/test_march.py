@@ -14,9 +14,9 @@ import pytest
 import realtime.methods.cloud_collectors as method
 from realtime.clouds.bounds import cloud_surfaces
 from realtime.clouds.collector_search import Search
-from realtime.clouds.hypertexture.light_depths import light_depths, marched_leg
-from realtime.clouds.hypertexture.lit_surface import dense_surface
-from realtime.clouds.hypertexture.march import marched_depths
+from realtime.clouds.light_depths import light_depths
+from realtime.clouds.lit_surface import dense_surface
+from realtime.clouds.march import depths_along, leg_through
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
@@ -103,7 +103,7 @@ def test_depths_are_the_sums_of_the_grid_and_converge():
     expected = exact_depths(values / 1.0, read, direction, 0.0363 * values.max())
     errors = []
     for stride in (2.0, 1.0, 0.5, 0.25):
-        (found,) = marched_depths(
+        (found,) = depths_along(
             surfaces,
             clouds,
             read.camera.origin,
@@ -115,7 +115,7 @@ def test_depths_are_the_sums_of_the_grid_and_converge():
         errors.append(np.sqrt(np.mean((np.array(found) - expected) ** 2)) / expected.mean())
     assert errors[1] < 0.02
     assert errors[3] < 0.3 * errors[1]
-    (seen,) = marched_depths(
+    (seen,) = depths_along(
         surfaces, clouds, read.camera.origin, direction, mi.Float(dr.inf), stride=dr.opaque(mi.Float, 0.25), seen=True
     )
     np.testing.assert_allclose(np.exp(-np.array(seen)), np.exp(-expected), atol=2e-3)
@@ -157,7 +157,7 @@ def test_the_map_of_a_sun_holds_the_depths_of_legs():
     random = np.random.default_rng(3)
     points = mi.Vector3f(*(aligned_array(mi.Float, column) for column in random.uniform(LOW, HIGH, (4000, 3)).T))
     stride = dr.opaque(mi.Float, 0.25)
-    (expected,) = (np.array(leg) for leg in marched_leg(surfaces, clouds, light, stride=stride)(points, True))
+    (expected,) = (np.array(leg) for leg in leg_through(surfaces, clouds, light, stride=stride)(points, True))
     found = (
         0.0363 * waves(13).max() * np.array(light_depths(surfaces, clouds, light, cloud=0, stride=stride).at(points))
     )

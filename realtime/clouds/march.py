@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Small steps of rays through clouds with densities, and optical depths.
+r"""Steps of rays through clouds, and optical depths.
 
 A step of the length dx has the density in its middle, rho, and the depth kappa rho dx: the midpoint rule, whose error
-falls with dx^2. Steps start as long as a voxel, and grow with the depth tau to the eye like exp(tau/s), s =
-`realtime.clouds.single_scattering.SPREAD`: what lies behind tau shows with exp(-tau), so all steps have about
-the same share in what is wrong of it.
+falls with dx^2. In a grid steps start as long as a voxel, and grow with the depth tau to the eye like exp(tau/s), s =
+`SPREAD`: what lies behind tau shows with exp(-tau), so all steps have about the same share in what is wrong of it. A
+homogeneous cloud is one of density 1, without voxels: its stretches are the steps.
 """
 
 from collections.abc import Callable
@@ -13,11 +13,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import CloudSurfaces, next_crossing
-from realtime.clouds.single_scattering import SPREAD
+from realtime.clouds.bounds import CloudSurfaces, next_crossing, optical_depths
 from realtime.numerics.array_types import Metres
+from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 
+SPREAD = 2.0  #: s
 #: A depth behind which nothing shows: exp(-20) = 2e-9.
 OPAQUE = 20.0
 _SHORTEST = 1e-6  # of a step, of the distance: rounding leaves as much
@@ -26,26 +27,34 @@ _SHORTEST = 1e-6  # of a step, of the distance: rounding leaves as much
 def march(
     surfaces: CloudSurfaces, origin, direction, end, total, *, step: Callable, add: Callable, active: Any = True
 ) -> Any:
-    """Add up what small steps of rays within clouds have, from the nearest to the farthest.
+    """Add up what steps of rays within clouds have, from the nearest to the farthest.
 
     `surfaces`: the boundaries of clouds; `origin`, `direction`, `end`: rays [m], their unit directions, and where they
     end, may be infinite [m]; `total`: the sum of no step, a tuple of arrays of the rays' width; `step`: (total,
     distance [m], cloud, active) -> how long a step may be [m]; `add`: (total, begin, end, cloud, inside) -> total, and
-    whether to go on, for steps [m] in the cloud of a number; `active`: lanes to compute.
+    whether to go on, for steps [m] in the cloud of a number: the first in a stretch has no length, and says where it
+    begins; `active`: lanes to compute.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
+
+    def look(x):
+        crossing = next_crossing(surfaces, origin, direction, x)
+        return crossing.distance, crossing.leaves, crossing.cloud
 
     def body(x, edge, cloud, total, going):
         # Where no stretch is open, look for the next crossing: its far end if the ray is in a cloud, else its start.
         looks = going & (x >= edge)
-        crossing = next_crossing(surfaces, origin, direction, x, looks)
-        opens, jumps, steps_on = looks & crossing.leaves, looks & ~crossing.leaves, going & ~looks
-        edge = dr.select(opens, dr.minimum(crossing.distance, end), edge)
-        cloud = dr.select(opens, crossing.cloud, cloud)
-        target = dr.minimum(x + dr.maximum(step(total, x, cloud, steps_on), _SHORTEST * x), edge)
-        total, goes_on = add(total, x, target, cloud, steps_on)
-        x = dr.select(jumps, crossing.distance, dr.select(steps_on, target, x))
-        return x, edge, cloud, total, going & (x < end) & (looks | goes_on)
+        none = Float(dr.inf), mi.Bool(False), mi.UInt32(0)
+        distance, leaves, ahead = dr.if_stmt(args=(x,), cond=looks, true_fn=look, false_fn=lambda x: none)
+        opens, jumps, steps_on = looks & leaves, looks & ~leaves, going & ~looks
+        edge = dr.select(opens, dr.minimum(distance, end), edge)
+        cloud = dr.select(opens, ahead, cloud)
+        longest = dr.maximum(step(total, x, cloud, steps_on), _SHORTEST * x)
+        target = dr.select(steps_on, dr.minimum(x + longest, edge), x)
+        inside = opens | steps_on
+        total, goes_on = add(total, x, target, cloud, inside)
+        x = dr.select(jumps, distance, target)
+        return x, edge, cloud, total, going & (x < end) & (~inside | goes_on)
 
     zero = dr.zeros(Float, lanes)
     going = dr.full(mi.Bool, True, lanes) & active & (zero < end)
@@ -56,25 +65,29 @@ def march(
 
 def middle_density(clouds: Clouds, origin, direction, begin, end, cloud, inside) -> Any:
     """Return rho in the middle of steps [1]."""
-    assert clouds.density is not None
+    if clouds.density is None:
+        return 1
     return clouds.density.at(origin + direction * (0.5 * (begin + end)), cloud, inside)
 
 
 def voxel(clouds: Clouds, cloud, active) -> Metres:
     """Return the width of a voxel of the clouds of some numbers, infinite where they have none [m]."""
-    assert clouds.density is not None
+    if clouds.density is None:
+        return type(clouds.sigma_t[0])(dr.inf)
     return dr.gather(type(clouds.density.voxel), clouds.density.voxel, cloud, active)
 
 
-def marched_depths(
+def depths_along(
     surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any, seen: bool, active: Any = True
 ) -> tuple[Any, ...]:
     """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
     `surfaces`, `clouds`, `origin`, `direction`, `end`, `active`: as for
-    `realtime.clouds.bounds.optical_depths`; how long the first steps are [voxels]; `seen`: whether the depths
-    are those of what the eye sees: steps grow, and end behind `OPAQUE`.
+    `realtime.clouds.bounds.optical_depths`; `stride`: how long the first steps are in grids [voxels]; `seen`: whether
+    the depths are those of what the eye sees: there steps grow, and end behind `OPAQUE`.
     """
+    if clouds.density is None:
+        return optical_depths(surfaces, clouds, origin, direction, end, active)
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 
     def step(depths, x, cloud, inside):
@@ -91,6 +104,36 @@ def marched_depths(
 
     nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
     return march(surfaces, origin, direction, end, nothing, step=step, add=add, active=active)
+
+
+def leg_through(
+    surfaces: CloudSurfaces, clouds: Clouds, light: Light, *, stride: Any
+) -> Callable[[Any, Any], tuple[Any, ...]]:
+    """Return the function from points [m] and active lanes to the depths of the legs from a light."""
+
+    def leg(point, active):
+        end = type(point.x)(dr.inf)
+        return depths_along(surfaces, clouds, point, -light.axis, end, stride=stride, seen=False, active=active)
+
+    return leg
+
+
+def leg_by_lengths(clouds: Clouds, lengths: Any) -> Callable[[Any, Any], tuple[Any, ...]]:
+    """Return the function from points [m] and active lanes to the depths of legs by channel.
+
+    `lengths`: by cloud a function (point, active) -> how much of it lies on the leg, at its full density [m].
+    """
+
+    def leg(point, active):
+        Float = type(point.x)
+        depths = [Float(0) for _ in clouds.sigma_t]
+        for cloud, length_to in enumerate(lengths):
+            length = length_to(point, active)
+            kappas = (dr.gather(Float, sigma_t, mi.UInt32(cloud)) for sigma_t in clouds.sigma_t)
+            depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
+        return tuple(depths)
+
+    return leg
 
 
 def least(depths: tuple[Any, ...]) -> Any:

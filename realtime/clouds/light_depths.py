@@ -13,7 +13,7 @@ map alone takes the way from the first surface for cloud of one density, without
 sigma_t l, so that other extinctions need no new map.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,8 +21,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.clouds.bounds import CloudSurfaces
-from realtime.clouds.hypertexture.march import march, marched_depths, middle_density, voxel
-from realtime.clouds.single_scattering import exact_leg
+from realtime.clouds.march import march, middle_density, voxel
 from realtime.numerics.array_types import Metres, bytes_of
 from realtime.numerics.functions import cell_of
 from realtime.scene.lights import Light
@@ -87,7 +86,7 @@ def light_depths(
 
     def widen(total, begin, end, number, inside):
         first, last = total
-        rho = middle_density(clouds, origin, direction, begin, _finite(begin, end), number, inside)
+        rho = middle_density(clouds, origin, direction, begin, end, number, inside)
         there = inside & (number == cloud) & (rho > 0)
         return (dr.select(there, dr.minimum(first, begin), first), dr.select(there, end, last)), inside
 
@@ -138,46 +137,6 @@ def sun_depths(
         tuple(light_depths(surfaces, clouds, light, cloud=cloud, stride=stride) for cloud in range(count))
         for light in lights
     )
-
-
-def leg_by_depths(clouds: Clouds, by_cloud: tuple[LightDepths, ...]) -> Callable[[Any, Any], tuple[Any, ...]]:
-    """Return the function from points [m] and active lanes to the depths of legs by channel, by maps."""
-
-    def leg(point, active):
-        Float = type(point.x)
-        depths = [Float(0) for _ in clouds.sigma_t]
-        for cloud, own in enumerate(by_cloud):
-            length = own.at(point, active)
-            kappas = (dr.gather(Float, sigma_t, mi.UInt32(cloud)) for sigma_t in clouds.sigma_t)
-            depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
-        return tuple(depths)
-
-    return leg
-
-
-def marched_leg(
-    surfaces: CloudSurfaces, clouds: Clouds, light: Light, *, stride: Any
-) -> Callable[[Any, Any], tuple[Any, ...]]:
-    """Return the function from points [m] and active lanes to the depths of legs from a light, by marches."""
-
-    def leg(point, active):
-        end = type(point.x)(dr.inf)
-        return marched_depths(surfaces, clouds, point, -light.axis, end, stride=stride, seen=False, active=active)
-
-    return leg
-
-
-def leg_through(
-    surfaces: CloudSurfaces, clouds: Clouds, light: Light, *, stride: Any
-) -> Callable[[Any, Any], tuple[Any, ...]]:
-    """Return the function from points [m] and active lanes to the depths of legs by cast rays and marches."""
-    if clouds.density is None:
-        return exact_leg(surfaces, clouds, light)
-    return marched_leg(surfaces, clouds, light, stride=stride)
-
-
-def _finite(begin, end):
-    return dr.select(dr.isfinite(end), end, begin)
 
 
 def depths_memory(Float: Any) -> int:
