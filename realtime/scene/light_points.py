@@ -3,13 +3,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from realtime.area_lights.points import PlacedPoints, place_points
-from realtime.numerics.array_types import ArrayTypes, aligned_numbers, host_numbers, types_of
+from realtime.numerics.array_types import ArrayTypes, aligned_array, aligned_numbers, host_numbers, types_of
 from realtime.scene.lights import Facing, Light
 from realtime.scene.read_scene import Scene
 
@@ -44,23 +46,52 @@ def source_shape(scene: Scene, light: Light) -> str | None:
 
 
 @dataclass(frozen=True)
-class HostLightPoints:
-    """Light points on the host, one a row, in float64."""
+class LightFrame:
+    """A light point, or one of several in each lane, and the orthonormal frame of its normal."""
 
-    position: Array  #: (points, 3) [m]
-    normal: Array  #: unit normals, (points, 3)
-    across: Array  #: unit vectors across them, (points, 3)
-    lift: Array  #: how far before the shape rays start, (points, 1) [m]
+    position: Any  #: [m]
+    across: Any
+    up: Any
+    normal: Any
+    lift: Any  #: how far before the shape rays start [m]
+
+    def local(self, vector: Any) -> tuple[Any, Any, Any]:
+        """Return the coordinates of a vector in the frame."""
+        return dr.dot(vector, self.across), dr.dot(vector, self.up), dr.dot(vector, self.normal)
+
+    def shadow_ray(self, point: Any) -> Any:
+        """Return the Mitsuba ray that is blocked where a light point does not reach a point [m]."""
+        start = mi.Point3f(self.position + self.normal * self.lift)
+        direction = mi.Vector3f(point) - mi.Vector3f(start)
+        length = dr.norm(direction)
+        # As `realtime.scene.lights.Light.shadow_ray`: a surface at the point itself must not block the light.
+        return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
 
 
-def read_light_points(points: Sequence[Light]) -> HostLightPoints:
-    """Bring light points to the host together, which waits for the device once."""
+def light_frames(points: Sequence[Light]) -> LightFrame:
+    """Return light points in one table, a lane each, so that one loop goes over them, whatever their number.
+
+    They are brought to the host together, which waits for the device once.
+    """
     each = [(point.position, own.exact_normal, own.lift) for point in points if (own := point.facing)]
     numbers = host_numbers(*(value for of_point in each for value in of_point))
     position, normal, lift = (np.stack(numbers[first::3]) for first in range(3))
     helper = np.where(np.abs(normal[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     across = np.cross(helper, normal)
-    return HostLightPoints(position, normal, across / np.linalg.norm(across, axis=1, keepdims=True), lift)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    types = types_of(type(points[0].position.x))
+
+    def lanes(rows: Array):
+        return types.vector(*(aligned_array(types.scalar, column) for column in rows.T))
+
+    up = lanes(np.cross(normal, across))
+    return LightFrame(lanes(position), lanes(across), up, lanes(normal), aligned_array(types.scalar, lift[:, 0]))
+
+
+def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
+    """Return light points of a table by their numbers."""
+    assert frames is not None
+    return dr.gather(LightFrame, frames, number)
 
 
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:

@@ -25,30 +25,8 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.numerics.array_types import bytes_of
+from realtime.scene.light_points import LightFrame
 from realtime.shadow_maps.shadow_map import check_size, tiled_corners
-
-
-@dataclass(frozen=True)
-class LightFrame:
-    """A light point, or one of several in each lane, and the orthonormal frame of its normal."""
-
-    position: Any  #: [m]
-    across: Any
-    up: Any
-    normal: Any
-    lift: Any  #: how far before the shape rays start [m]
-
-    def local(self, vector: Any) -> tuple[Any, Any, Any]:
-        """Return the coordinates of a vector in the frame."""
-        return dr.dot(vector, self.across), dr.dot(vector, self.up), dr.dot(vector, self.normal)
-
-    def shadow_ray(self, point: Any) -> Any:
-        """Return the Mitsuba ray that is blocked where a light point does not reach a point [m]."""
-        start = mi.Point3f(self.position + self.normal * self.lift)
-        direction = mi.Vector3f(point) - mi.Vector3f(start)
-        length = dr.norm(direction)
-        # As `realtime.scene.lights.Light.shadow_ray`: a surface at the point itself must not block the light.
-        return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
 
 
 @dataclass(frozen=True)

@@ -32,12 +32,13 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.methods.froxel_fog.grid import Grid
-from realtime.methods.froxel_fog.light_points import LightPointTable
 from realtime.methods.interface.method import View
 from realtime.numerics.array_types import PerRay
 from realtime.rays import profile
+from realtime.scene.light_points import LightFrame, frame_at
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Rays
+from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 #: (point, light, its number among all lights) -> whether it is lit.
 Visibility = Callable[[Any, Light, int], Any]
@@ -45,6 +46,16 @@ Visibility = Callable[[Any, Light, int], Any]
 _GROWTH = 1.2207440846057596  # g^4 = g + 1
 _STEPS = tuple(round(2**32 / _GROWTH**power) % 2**32 for power in (1, 2, 3))
 _UNROLLED = 4  # lights in one kernel where media have bounds: no loop can write down how a light sees them
+
+
+@dataclass(frozen=True)
+class LightPointTable:
+    """The points of one light with extent."""
+
+    source: int  #: the number of the light
+    count: int  #: how many points it has
+    frames: LightFrame  #: one a lane
+    maps: HemisphereMaps | None  #: of all points; None: rays are cast
 
 
 @dataclass(frozen=True)
@@ -124,7 +135,7 @@ def _sum_over_points(view: View, table: LightPointTable, like: Light, points: Fr
     medium = view.medium
 
     def step(number, total):
-        frame = table.frame(number, like)
+        frame = frame_at(table.frames, number)
         away = points.point - frame.position
         a, b, c = frame.local(away)
         square = dr.fma(a, a, dr.fma(b, b, c * c))

@@ -19,13 +19,13 @@ from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pixels
 from realtime.methods.froxel_fog.grid import column_rays, view_grid
-from realtime.methods.froxel_fog.injection import Visibility, frame_shift, scattered_light
-from realtime.methods.froxel_fog.light_points import LightPointTable, tabulated
+from realtime.methods.froxel_fog.injection import LightPointTable, Visibility, frame_shift, scattered_light
 from realtime.methods.interface.method import Layers, Method, View
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import parameter
+from realtime.scene.light_points import frame_at, light_frames
 from realtime.scene.lights import Light
-from realtime.shadow_maps.hemisphere_map import maps_memory
+from realtime.shadow_maps.hemisphere_map import cast_hemisphere_maps, maps_memory
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_maps, lit_in_map, map_memory, map_size
 
 _NUMBERS = 12  # of a froxel: scattered light and airlight, four each, and as much on the way
@@ -112,20 +112,24 @@ class FroxelFog(Method):
 
     def preparation(self, scene):
         """Return what makes tables of light samples and, if they are asked for, shadow maps."""
-        if self.shadow != "map" or not scene.features.shadows:
-            return lambda now: FroxelShadows((), tabulated(now.lights))
+        with_maps = self.shadow == "map" and scene.features.shadows
 
-        def cast(now):
-            ordinary = [light for light in now.lights if light.source is None]
-            first = {light.source: light for light in now.lights}
-            tables = (
-                table.with_maps(now.geometry, first[table.source], self.point_map) for table in tabulated(now.lights)
-            )
-            return FroxelShadows(
-                tuple(cast_shadow_map(now.geometry, light, self.map) for light in ordinary), tuple(tables)
-            )
+        def prepare(now):
+            by_source: dict[int | None, list[Light]] = {}
+            for light in now.lights:
+                by_source.setdefault(light.source, []).append(light)
+            maps = [cast_shadow_map(now.geometry, light, self.map) for light in by_source.pop(None, []) if with_maps]
+            tables = (self._table(now.geometry, source, points, with_maps) for source, points in by_source.items())
+            return FroxelShadows(tuple(maps), tuple(tables))
 
-        return cast
+        return prepare
+
+    def _table(self, geometry, source, points, with_maps):
+        """Return the points of one light."""
+        count, frames, maps = len(points), light_frames(points), None
+        if with_maps:
+            maps = cast_hemisphere_maps(geometry, frames, count, self.point_map, for_surfaces=False)
+        return LightPointTable(source, count, frames, maps)
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
@@ -154,6 +158,9 @@ def _visibility(view: View, shadows: FroxelShadows, shadow: str) -> Visibility:
         # In bounded media light points come one by one.
         table = next(table for table in shadows.tables if table.source == light.source)
         before = next(index for index, other in enumerate(view.lights) if other.source == light.source)
-        return table.lit(mi.UInt32(number - before), light, point)
+        assert table.maps is not None
+        own = mi.UInt32(number - before)
+        frame = frame_at(table.frames, own)
+        return table.maps.lit(own, frame.local(point - frame.position))
 
     return visible

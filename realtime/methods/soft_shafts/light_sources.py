@@ -10,10 +10,10 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from realtime.numerics.array_types import aligned_array, types_of
-from realtime.scene.light_points import read_light_points
+from realtime.numerics.array_types import aligned_array
+from realtime.scene.light_points import LightFrame, light_frames
 from realtime.scene.lights import Light
-from realtime.shadow_maps.hemisphere_map import HemisphereMaps, LightFrame, cast_hemisphere_maps
+from realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 
 
@@ -35,20 +35,8 @@ def source_state(
     if lights[0].facing is None:
         maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
         return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
-    read = read_light_points(lights)
-    positions, normals = read.position, read.normal
-    Vector = types_of(Float).vector
-
-    def lanes(rows: Any) -> Any:
-        return Vector(*(aligned_array(Float, column) for column in rows.T))
-
-    frames = LightFrame(
-        lanes(positions),
-        lanes(read.across),
-        lanes(np.cross(normals, read.across)),
-        lanes(normals),
-        aligned_array(Float, read.lift[:, 0]),
-    )
+    frames = light_frames(lights)
+    positions, normals = (np.array(rows, dtype=np.float64).T for rows in (frames.position, frames.normal))
     # Of a square of the side L the mean square distance from the middle is L^2 / 6.
     spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))
     hemispheres = None
@@ -56,9 +44,3 @@ def source_state(
         hemispheres = cast_hemisphere_maps(scene, frames, len(lights), size, for_surfaces=for_surfaces)
     flat = bool(np.all(normals == normals[0]))
     return SourceState(frames, aligned_array(Float, np.array([np.sqrt(6 * spread)])), flat, hemispheres)
-
-
-def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
-    """Return light points of a table by their numbers."""
-    assert frames is not None
-    return dr.gather(LightFrame, frames, number)

@@ -20,8 +20,9 @@ import mitsuba as mi
 
 from realtime.methods.interface.marching import midpoint_sum, steps_between
 from realtime.methods.interface.method import View
-from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
+from realtime.methods.soft_shafts.light_sources import SourceState
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
+from realtime.scene.light_points import frame_at
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 

@@ -33,7 +33,7 @@ from realtime.errors import InputError
 from realtime.image_filters import Raster, depth_guide, separable, small_pixels, tile_average, upsample
 from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.method import Layers, View
-from realtime.methods.soft_shafts.light_sources import SourceState, frame_at, source_state
+from realtime.methods.soft_shafts.light_sources import SourceState, source_state
 from realtime.methods.soft_shafts.march import Share, integral_of_points
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
 from realtime.methods.soft_shafts.smoothing import smooth_airlight, smooth_share
@@ -47,6 +47,7 @@ from realtime.methods.soft_shafts.surfaces import (
     reached_surfaces,
 )
 from realtime.numerics.array_types import two_numbers
+from realtime.scene.light_points import frame_at
 from realtime.scene.lights import sources_of
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
 from realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory

@@ -23,10 +23,11 @@ import mitsuba as mi
 
 from realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
 from realtime.methods.interface.method import View
-from realtime.methods.soft_shafts.light_sources import SourceState, frame_at
+from realtime.methods.soft_shafts.light_sources import SourceState
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.camera import Camera
+from realtime.scene.light_points import frame_at
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 #: c of hd = c w / N: what smooths the staircase of N levels best (`tests/.../test_auto_width.py` fits it again).
