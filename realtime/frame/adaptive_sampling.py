@@ -42,7 +42,6 @@ from realtime.numerics.array_types import Metres, PerRay, PerTile, aligned_array
 from realtime.scene.camera import SIDE, TILE, Camera
 
 _DEPTHS = 1.1  # largest to least distance in a tile
-_LIGHTS = 32  # one bit each
 
 #: (pixel, distance, what the last frame handed on) -> the layers of some pixels, evaluated or not.
 Render = Callable[[PerRay, Metres, Any], Layers]
@@ -60,18 +59,16 @@ class Corners:
     inner: PerTile  #: whether there are tiles on the right and below
 
 
-def tile_corners(pixel, camera: Camera, *, by_rays: bool, lights: int) -> Corners:
+def tile_corners(pixel, camera: Camera, *, by_rays: bool) -> Corners:
     """Return how the tiles of an image lie; `pixel` are its pixel numbers in square tiles.
 
-    Raises InputError for a method that draws all pixels together and not `by_rays`, more `lights` than a number has
-    bits, and an image whose sides are no multiples of four or less than three tiles.
+    Raises InputError for a method that draws all pixels together and not `by_rays`, and an image whose sides are no
+    multiples of four or less than three tiles.
     """
     if not by_rays:
         raise InputError(
             "tolerance: wanted each ray by itself, which evaluation=mesh and vertex do not; use tolerance=0"
         )
-    if lights > _LIGHTS:
-        raise InputError(f"tolerance: got a scene of {lights} lights, wanted up to {_LIGHTS}; use tolerance=0")
     width, height = camera.width, camera.height
     across, down = width // SIDE, height // SIDE
     if width % SIDE or height % SIDE or across < 3 or down < 3:
@@ -112,19 +109,17 @@ def adaptive_layers(
     tiles = lanes // TILE
     first = dr.arange(mi.UInt32, tiles) * TILE
     at_corners = render(dr.gather(mi.UInt32, pixel, first), dr.gather(Float, distance, first), last)
-    numbers, masks = _parts(at_corners)
-    numbers = [number + dr.zeros(Float, tiles) for number in numbers]
-    reached = _bits(masks) + dr.zeros(mi.UInt32, tiles)
-    dr.eval(numbers, reached, at_corners.carried)
-    smooth = _smooth(corners, distance, numbers, reached, tolerance)
+    numbers, masks = _parts(at_corners, Float)
+    numbers, masks = ([part + dr.zeros(Float, tiles) for part in parts] for parts in (numbers, masks))
+    dr.eval(numbers, masks, at_corners.carried)
+    smooth = _smooth(corners, distance, numbers, masks, tolerance)
     dr.eval(smooth)
 
     lane = dr.arange(mi.UInt32, lanes)
     own, row = lane // TILE, pixel // width
     x, y = (Float(value & (SIDE - 1)) * (1 / SIDE) for value in (pixel - row * width, row))
-    blended = [_between(number, corners, own, x, y) for number in numbers]
-    bits = dr.gather(mi.UInt32, reached, own)
-    dr.eval(blended, bits)
+    blended = [_between(part, corners, own, x, y) for part in (*numbers, *masks)]
+    dr.eval(blended)
     rough = dr.compress(~dr.gather(mi.Bool, smooth, own))
     if dr.width(rough):
         # Whole tiles of lanes, the last one again, so that no recorded function finds an array of one entry.
@@ -132,11 +127,10 @@ def adaptive_layers(
         rough = dr.gather(mi.UInt32, rough, dr.minimum(dr.arange(mi.UInt32, -(-count // TILE) * TILE), count - 1))
         handed_on = gathered(at_corners.carried, rough // TILE)
         asked = dr.gather(mi.UInt32, pixel, rough), dr.gather(Float, distance, rough)
-        some, some_masks = _parts(render(*asked, handed_on))
-        for image, values in zip(blended, some, strict=True):
+        some, some_masks = _parts(render(*asked, handed_on), Float)
+        for image, values in zip(blended, (*some, *some_masks), strict=True):
             dr.scatter(image, values + dr.zeros(Float, dr.width(rough)), rough)
-        dr.scatter(bits, _bits(some_masks) + dr.zeros(mi.UInt32, dr.width(rough)), rough)
-    return _with_parts(at_corners, blended, [(bits >> number & 1) != 0 for number in range(len(masks))])
+    return _with_parts(at_corners, blended[: len(numbers)], [part > 0.5 for part in blended[len(numbers) :]])
 
 
 def gathered(value: Any, index: PerRay) -> Any:
@@ -154,12 +148,12 @@ def _is_mask(fraction: Any) -> bool:
     return isinstance(fraction, bool) or dr.is_mask_v(fraction)
 
 
-def _parts(layers: Layers) -> tuple[list[Any], list[Any]]:
-    """Return the numbers and colours of layers, the airlight first, and the masks."""
+def _parts(layers: Layers, Float: Any) -> tuple[list[Any], list[Any]]:
+    """Return the numbers and colours of layers, the airlight first, and the masks as 0 or 1."""
     shares, extra = layers.visibility or (), (layers.extra or {}).values()
     more = (layers.transmittance, layers.background, *extra, *(share for share in shares if not _is_mask(share)))
     numbers = [layers.in_scattered, *(value for value in more if value is not None)]
-    return numbers, [share for share in shares if _is_mask(share)]
+    return numbers, [dr.select(share, Float(1), 0) for share in shares if _is_mask(share)]
 
 
 def _with_parts(layers: Layers, numbers: list[Any], masks: list[Any]) -> Layers:
@@ -175,11 +169,11 @@ def _with_parts(layers: Layers, numbers: list[Any], masks: list[Any]) -> Layers:
     return Layers(in_scattered, shares, transmittance, background, extra, layers.carried)
 
 
-def _smooth(corners: Corners, distance: Metres, numbers: list[Any], reached: PerTile, tolerance: float) -> PerTile:
+def _smooth(corners: Corners, distance: Metres, numbers: list[Any], masks: list[Any], tolerance: float) -> PerTile:
     """Return which tiles may be interpolated."""
     bends = [_second_difference(corners, number) for number in numbers]
     dr.eval(bends)
-    tile = dr.arange(mi.UInt32, dr.width(reached))
+    tile = dr.arange(mi.UInt32, dr.width(corners.right))
     four = tile, corners.right, corners.below, corners.diagonal
     smooth = corners.inner & _depths_alike(distance, four)
     for corner in four:
@@ -187,7 +181,8 @@ def _smooth(corners: Corners, distance: Metres, numbers: list[Any], reached: Per
             limits, values = (_channels(dr.gather(type(part), part, corner)) for part in (bend, number))
             for limit, value in zip(limits, values):
                 smooth &= limit <= tolerance * value
-        smooth &= dr.gather(mi.UInt32, reached, corner) == reached
+        for mask in masks:
+            smooth &= dr.gather(type(mask), mask, corner) == mask
     return smooth
 
 
@@ -201,14 +196,6 @@ def _between(number, corners: Corners, own, x, y):
 def _channels(value) -> list[Any]:
     """Return the channels of a colour, or a number as its only one."""
     return list(value) if dr.depth_v(value) > 1 else [value]
-
-
-def _bits(masks):
-    """Return by light, as one bit each, whether it reaches the surface."""
-    bits = mi.UInt32(0)
-    for number, reaches in enumerate(masks):
-        bits |= dr.select(reaches, mi.UInt32(1 << number), 0)
-    return bits
 
 
 def _second_difference(corners: Corners, color):

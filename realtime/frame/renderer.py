@@ -176,8 +176,7 @@ def frame_renderer(
     )
     groups = _lights_by_group(made)
     if chosen.interpolated:
-        most = max(map(len, groups))
-        made = replace(made, corners=tile_corners(pixel, scene.camera, by_rays=chosen.by_rays, lights=most))
+        made = replace(made, corners=tile_corners(pixel, scene.camera, by_rays=chosen.by_rays))
     structures: dict[Any, Stages] = {}
     if made.shades_apart:
         for lights in _few_lights(made):

@@ -28,7 +28,7 @@ def image_of(function, tolerance, *, depth=None, lit=None):
     """Return the image of a function of column and row between corners, and how many pixels were computed."""
     width, height = SIZE
     pixel = mi.UInt32(tiled_pixels(width, height))
-    corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), by_rays=True, lights=1)
+    corners = tile_corners(pixel, SimpleNamespace(width=width, height=height), by_rays=True)
     values, lights, distance = (
         np.ascontiguousarray(np.broadcast_to(entry, (height, width)).ravel(), dtype=kind)
         for entry, kind in (
