@@ -74,8 +74,6 @@ from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import map_size
 
 _HALF = 0.5  #: of the density, as printed
-#: N0 pi r_e^2 over the extinction by Mie's theory, for the droplets of the paper.
-_PRINTED_EXTINCTION = 0.0452 / 0.0363
 
 
 @dataclass(frozen=True)
@@ -107,11 +105,6 @@ class CloudCollectors(Method):
     )
     thickness: str = parameter(
         "slab", "slabs as thick as they are across, or along the light, as printed", choices=("slab", "light")
-    )
-    kappa: str = parameter(
-        "mie",
-        "the extinction of the scene, or 24.5 % more, which is what eq. 4 has for droplets",
-        choices=("mie", "printed"),
     )
     peak: str = parameter(
         "matched",
@@ -283,7 +276,7 @@ def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling,
 def _collected(view: View, state: CloudState, parameters: CloudCollectors) -> Layers:
     """Return the light of clouds along every ray [W/(m^2 sr)]."""
     Color = type(view.medium.albedo)
-    rays, thin_rays = _rays(view, state, parameters)
+    rays, thin_rays = _rays(view, state)
     by_set, kept = [_scattered_once(view, state, thin_rays, parameters), *(Color(0) for _ in SETS)], []
     entry = _entry(view, state, rays)
     suns = _suns(view, parameters)
@@ -309,10 +302,10 @@ def _suns(view: View, parameters: CloudCollectors) -> list[int]:
     return beams_of(view.lights, parameters.sky, view.medium.clouds)
 
 
-def _rays(view: View, state: CloudState, parameters: CloudCollectors) -> tuple[CloudRays, CloudRays]:
+def _rays(view: View, state: CloudState) -> tuple[CloudRays, CloudRays]:
     """Return camera rays through clouds as dense as they are, and through those without the peak."""
     assert view.medium.clouds is not None
-    clouds = _as_dense(view.medium.clouds, parameters)
+    clouds = view.medium.clouds
     thin = _without_peak(clouds, state)
     both = replace(clouds, sigma_t=(*clouds.sigma_t, *thin.sigma_t))
     rays = cloud_rays(state.surfaces, both, view.origin, view.direction, view.distance, stride=state.stride)
@@ -372,13 +365,6 @@ def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: 
         1 - opacity,
         sky_behind(view.lights, view.distance, type(view.medium.albedo)),
     )
-
-
-def _as_dense(clouds: Clouds, parameters: CloudCollectors) -> Clouds:
-    """Return clouds as dense as they are, or as eq. 4 makes them."""
-    if parameters.kappa == "mie":
-        return clouds
-    return replace(clouds, sigma_t=tuple(sigma_t * _PRINTED_EXTINCTION for sigma_t in clouds.sigma_t))
 
 
 def _without_peak(clouds: Clouds, state: CloudState) -> Clouds:

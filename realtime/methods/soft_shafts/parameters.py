@@ -79,9 +79,6 @@ class SoftShaftsParameters(Method):
         unit="pixels",
     )
     filter: str = parameter("bilateral", "of visibility and airlight", choices=("bilateral", "gauss", "none"))
-    form: str = parameter(
-        "direct", "of the filter: as it is defined, or along rows and then columns", choices=("direct", "separable")
-    )
     hd: str = parameter(
         "5",
         "standard deviation of the filter in the image; auto: by pixel, from the width of the penumbra",
@@ -99,7 +96,6 @@ class SoftShaftsParameters(Method):
         "self", "what the bilateral filter compares: the image itself, or depths", choices=("self", "depth")
     )
     hz: float = parameter(0.05, "relative difference of depths at which pixels are no longer alike", above=0, most=10)
-    support: float = parameter(3.0, "half side of the square of taps", above=0, most=4, unit="hd")
 
     def _check_together(self) -> None:
         if self.hd == AUTO and (self.filter != "bilateral" or self.guide != "depth"):

@@ -21,13 +21,13 @@ def smooth_share(
     """
     if p.filter == "gauss" or p.guide == "self":
         hr = math.inf if p.filter == "gauss" else p.hr
-        if levels and p.form == "direct":
-            return bilateral_of_levels(share, raster, levels=points, hd=p.width, hr=hr, support=p.support, there=there)
+        if levels:
+            return bilateral_of_levels(share, raster, levels=points, hd=p.width, hr=hr, there=there)
         # The sky is unlike all surfaces.
         sky = Guide(dr.select(there, type(share)(0), 1), 1e-3)
         guides = (sky,) if math.isinf(hr) else (sky, Guide(share, hr))
-        return _filtered(share, raster, guides, p.width, p)
-    return _filtered(share, raster, (depth,), p.width, p)
+        return _filtered(share, raster, guides, p.width)
+    return _filtered(share, raster, (depth,), p.width)
 
 
 def smooth_airlight(integral: Any, raster: Raster, *, depth: Guide, p: SoftShaftsParameters) -> Any:
@@ -39,9 +39,8 @@ def smooth_airlight(integral: Any, raster: Raster, *, depth: Guide, p: SoftShaft
         guides = (depth,)
     elif p.filter == "bilateral" and not math.isinf(p.hr):
         guides = (airlight_guide(integral, p.hr),)
-    return _filtered(integral, raster, guides, p.width / p.scale, p)
+    return _filtered(integral, raster, guides, p.width / p.scale)
 
 
-def _filtered(image: Any, raster: Raster, guides: tuple[Guide, ...], hd: float, p: SoftShaftsParameters) -> Any:
-    function = bilateral if p.form == "direct" and guides else separable
-    return function(image, raster, hd=hd, guides=guides, support=p.support)
+def _filtered(image: Any, raster: Raster, guides: tuple[Guide, ...], hd: float) -> Any:
+    return (bilateral if guides else separable)(image, raster, hd=hd, guides=guides)
