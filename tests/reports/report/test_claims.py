@@ -54,6 +54,9 @@ def test_claims_on_a_truth_that_is_confirmed():
     assert [(claim.kind, claim.good) for claim in claims(scenes())] == [("reference", True), ("left-out", None)]
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
     assert claims([]) == []
+    data = scenes()
+    data[1]["agreement"]["airlight"] = agreed(True, 0.0042, margin=0.0125)
+    assert "lies within its margin of ±0.5 % or ±1.25 %;" in texts(data)[0]
 
 
 @pytest.mark.claim("claims-follow")
@@ -61,7 +64,7 @@ def test_claims_on_a_truth_that_is_not_confirmed():
     data = scenes()
     data[1]["agreement"]["surface"]["statistics"]["equivalent"] = False
     trust = texts(data)[0]
-    assert "NOT confirmed within 0.5 % by Mitsuba's volpath in hall (surface)" in trust
+    assert "NOT confirmed within ±0.5 % by Mitsuba's volpath in hall (surface)" in trust
     assert "fog" not in trust
 
 
@@ -89,7 +92,7 @@ def test_out_of_time_can_still_speak_against_the_truth():
     data = scenes()
     data[1]["agreement"]["airlight"] = out_of_time([0.006, 0.03])
     assert verdict(record_of(data[1]["agreement"]["airlight"], Agreement)) is False
-    assert "NOT confirmed within 0.5 %" in claims(data)[0].text
+    assert "NOT confirmed within ±0.5 %" in claims(data)[0].text
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
     assert not confirmed(data)
 
