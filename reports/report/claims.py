@@ -111,8 +111,8 @@ def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
         low, high = (100 * (end or 0.0) for end in worst.statistics.relative_bias_ci)
         text = (
             f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
-            f"of the pooled relative bias lies within its margin of {margin}; the worst is {low:+.2g}..{high:+.2g} %, in {name} "
-            f"({worst.layer})."
+            f"of the pooled relative bias lies within its margin of {margin}; the worst is {low:+.2g}..{high:+.2g} %, "
+            f"in {name} ({worst.layer})."
         )
     if open_:
         text += (" " if text else "") + (
