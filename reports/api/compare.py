@@ -36,7 +36,6 @@ def compare(
     test: ImageLike,
     layer: str | None = None,
     *,
-    holds: Literal["airlight", "surface", "total"] | None = None,
     pixel: Literal["centre", "area"] | None = None,
     mask: Mask | None = None,
     margin: float | None = None,
@@ -68,9 +67,8 @@ def compare(
         The image to judge, an EXR file; from Python also a result or an array. With a scene also several files, # for
         each digit of their number, such as frames/####.exr: the frames of `--frames`, or independent renders.
     layer
-        Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight.
-    holds
-        With a scene: what the layer contains; by default what its name says.
+        Layer to compare: 'airlight' by default, or 'total' (R/G/B) if there is no airlight. With a scene NAME=airlight,
+        =surface or =total says what it contains; by default what its name says.
     pixel
         With a scene: whether pixels are values at their centre or means over their area. By default both are tried,
         which takes several times as long.
@@ -114,10 +112,13 @@ def compare(
     True
     """
     files = [Path(path) for path in several(output)]
+    layer, _, holds = (layer or "").partition("=") if "=" in (layer or "") else (layer, "", None)
+    if holds not in (None, "airlight", "surface", "total"):
+        raise InputError(f"layer: got {holds!r} as the content of {layer}, wanted airlight, surface or total")
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and not Path(str(test)).is_file():
         raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
-    own = {"holds": holds, "pixel": pixel, "diagnose": diagnose or None, "fit": fit, "frames": frames}
+    own = {"layer with its content": holds, "pixel": pixel, "diagnose": diagnose or None, "fit": fit, "frames": frames}
     for name, value in own.items():
         if value is not None and scene is None:
             raise InputError(f"{name}: goes with a scene in the place of the reference; two images are what they are")

@@ -148,8 +148,7 @@ def view(
     *,
     change: Values = (),
     size: Size = "640x480",
-    host: str = "127.0.0.1",
-    port: int = 0,
+    address: str = "127.0.0.1:0",
     **parameters: Any,
 ) -> None:
     """Show a scene live in the browser.
@@ -173,18 +172,17 @@ def view(
         Change the camera, a light or a medium of the scene, such as medium.sigma_t=0.1; may be given several times.
     size
         Width and height [pixels], or WxH.
-    host
-        The address to listen at.
-    port
-        The port to listen at; 0 is any free one.
+    address
+        The HOST:PORT to listen at; port 0 is any free one.
     parameters
         Parameters of the method.
     """
     from reports.machine.environment import activate, require
 
     require("websockets", "view", "the live view")
-    if not 0 <= port <= 65535:
-        raise InputError(f"port: got {port}, wanted a number from 0 to 65535; 0 is any free one")
+    host, _, digits = address.rpartition(":")
+    if not host or not digits.isdecimal() or not (port := int(digits)) <= 65535:
+        raise InputError(f"address: got {address!r}, wanted HOST:PORT, a port from 0, any free one, to 65535")
     from validation.study.configuration import Configuration, configuration
 
     chosen = method if isinstance(method, Configuration) else configuration(method, kernel_name(kernel), parameters)
@@ -201,7 +199,7 @@ def view(
             server = Server(host, port, opened=session.opened, told=session.told, closed=session.closed)
         except OSError as error:
             raise InputError(
-                f"host, port: cannot listen at {host}, port {port}: {error.strerror}; wanted an address of this "
+                f"address: cannot listen at {host}, port {port}: {error.strerror}; wanted an address of this "
                 "machine, and a port that is free: 0 finds one"
             ) from error
         server.start()

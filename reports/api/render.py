@@ -434,6 +434,9 @@ def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int) -> 
     check_work(what, [configuration_work(scene, chosen, frames)])
 
 
+_KERNEL = "kernel="  # begins a setting that names a kernel
+
+
 def asked_configurations(
     methods: Any, kernels: Any, settings: Any, *, usual: Any = None
 ) -> "tuple[list[Configuration], bool]":
@@ -441,14 +444,18 @@ def asked_configurations(
 
     A method is a name, a function or a configuration. A name without kernel and settings stands for its standard
     configurations; 'all', the default, for `usual`, or those of every built-in method for fog. Every method is measured
-    with each kernel and with all settings, given by name or as NAME=VALUE.
+    with each kernel and with all settings, given by name or as NAME=VALUE; kernel=NAME is one more kernel.
     """
     from realtime.methods.registry import FOG_METHODS
     from realtime.methods.shader.source import is_users
     from validation.study.configuration import Configuration, chosen_configurations, configuration, parse_settings
 
-    given = dict(settings) if isinstance(settings, Mapping) else parse_settings(several(settings))
     named_kernels = several(kernels)
+    if isinstance(settings, Mapping):
+        given = dict(settings)
+    else:
+        named_kernels += [word.removeprefix(_KERNEL) for word in several(settings) if word.startswith(_KERNEL)]
+        given = parse_settings([word for word in several(settings) if not word.startswith(_KERNEL)])
     option = "set" if given else "kernel" if named_kernels else ""
     chosen: list[Configuration] = []
     apart = True

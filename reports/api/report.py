@@ -160,7 +160,7 @@ def report(
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
-        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
+        NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
     images
         Folder with images of your engine, SCENE.exr or SCENE.NAME.exr, to compare with the reference.
     output
@@ -412,7 +412,6 @@ def paper(
     *,
     figures: File | None = None,
     quick: bool = False,
-    fresh: bool = False,
     progress: Progress = None,
 ) -> PaperClaims:
     """Give a verdict on every claim of the papers.
@@ -430,8 +429,6 @@ def paper(
         Also draw the pictures of the papers in our scenes into this folder, as PDF and PNG with their data.
     quick
         Only the claims that need no image, and small figures.
-    fresh
-        Measure again what earlier runs have cached.
     progress
         Called with (fraction done, what); True shows a bar.
 
@@ -440,9 +437,6 @@ def paper(
     InputError
         For an unknown paper.
     """
-    import time
-
-    from reference.storage.kept import fresh_results
     from reports.machine.environment import activate, describe_environment
     from reports.report.others import measure_claims
     from validation.papers.claims import claims, papers
@@ -451,7 +445,7 @@ def paper(
         raise InputError(f"paper: got {name!r}, wanted one of {', '.join(papers())}" + nearest(name, papers()))
     chosen = [claim for claim in claims() if name in (None, claim.paper)]
     activate()
-    with telling(progress, "paper") as tell, fresh_results(time.time() if fresh else None):
+    with telling(progress, "paper") as tell:
         rows = measure_claims(chosen, quick=quick, progress=tell)
     written: tuple[str, ...] = ()
     if figures is not None:

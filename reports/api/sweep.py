@@ -97,9 +97,8 @@ class SweepFindings(Result):
 
 @one_error
 def sweep(
-    study: File | None = None,
+    study: File | int | None = None,
     *,
-    random: int | None = None,
     cluster: str | None = None,
     output: File | None = None,
     from_: File | None = None,
@@ -121,9 +120,7 @@ def sweep(
     Parameters
     ----------
     study
-        A TOML file: what to sweep over, see docs/many-scenes.md.
-    random
-        Number of random scenes; 100 without a study.
+        A TOML file: what to sweep over, see docs/many-scenes.md; or a number of random scenes, 100 by default.
     cluster
         Let workers compute: local[:N] processes, tcp://HOST:PORT or tls://HOST:PORT of a Dask scheduler, or its
         scheduler file. A tcp scheduler authenticates nobody and its workers run what they are sent: use it only on a
@@ -139,7 +136,7 @@ def sweep(
 
     require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
-        beside = {"a study": study, "random": random, "cluster": cluster}
+        beside = {"a study": study, "cluster": cluster}
         only_from("sweep", "computes nothing", beside)
         from reports.sweep.page import write_sweep
 
@@ -149,8 +146,8 @@ def sweep(
     from validation.study.study import default_study, read_study
 
     place = parse_place(cluster)
-    count = _USUAL if random is None else random
-    chosen = default_study(count) if study is None else read_study(Path(study), count=random)
+    number = str(_USUAL if study is None else study)
+    chosen = default_study(int(number)) if number.isdecimal() else read_study(Path(number))
     folder = Path(output or f"sweep-{chosen.name}")
     variant = activate()
     with RowStore(folder) as store:

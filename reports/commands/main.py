@@ -75,7 +75,10 @@ Exit status: 0 done, 1 a check failed, 2 wrong usage or input, 3 something is mi
 """
 _SET = Annotated[
     Sequence[str],
-    Parameter(name="--set", help="NAME=VALUE, a parameter of the method; may be given several times."),
+    Parameter(
+        name="--set",
+        help="NAME=VALUE, a parameter of the method, or kernel=NAME for its kernel; may be given several times.",
+    ),
 ]
 _JSON = Annotated[bool, Parameter(name="--json", help="Print JSON.")]
 _OUTPUT = Annotated[Files, Parameter(name=("--output", "-o"), help="A file to write; may be given several times.")]
@@ -93,12 +96,14 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
     own = inspect.signature(function).parameters
     scope = inspect.unwrap(function).__globals__
     words = {each.arg_name: _plain(each.description) for each in docstring_parser.parse(function.__doc__ or "").params}
+    # What has --set takes a kernel by --set kernel=NAME.
+    sets = "settings" in own or any(each.kind is inspect.Parameter.VAR_KEYWORD for each in own.values())
     positional: list[inspect.Parameter] = []
     named: list[inspect.Parameter] = []
     for at, each in enumerate(own.values()):
         kind: Any = inspect.Parameter.KEYWORD_ONLY
         annotation, default = each.annotation, each.default
-        if each.name == "progress":
+        if each.name == "progress" or (each.name == "kernel" and sets):
             continue
         if each.kind is inspect.Parameter.VAR_KEYWORD:
             named.append(inspect.Parameter("settings", kind, annotation=_SET, default=()))

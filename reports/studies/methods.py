@@ -89,7 +89,7 @@ def methods(
     kernel
         Airlight kernel of the methods; may be given several times.
     settings
-        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
+        NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     seconds
@@ -234,7 +234,7 @@ def decomposition(
     method
         A method, as in `airlight study methods`; by default a ray march by a map, min-max and froxel-fog.
     settings
-        NAME=VALUE, a parameter for each method that `--method` names; may be given several times.
+        NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
     size
         Width and height [pixels], or WxH.
     progress

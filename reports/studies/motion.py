@@ -9,6 +9,9 @@ from reports.machine.progress import counted
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import numbers, table, words
 
+_TURN = 120  # frames of a whole turn in a sweep
+_RUNS = 4  # of a method that draws random numbers
+
 
 @one_error
 def motion(
@@ -16,8 +19,6 @@ def motion(
     *,
     stimulus: Literal["sweep", "step"] = "sweep",
     frames: int = 24,
-    turn: int = 120,
-    runs: int = 4,
     method: Methods = (),
     kernel: Kernels = (),
     settings: Values = (),
@@ -34,13 +35,9 @@ def motion(
     scene
         A scene whose lights have no extent.
     stimulus
-        Lights that circle (sweep), or that jump after eight frames (step).
+        Lights that circle, 120 frames a turn (sweep), or that jump after eight frames (step).
     frames
         How many are rendered.
-    turn
-        Frames of a whole turn in a sweep.
-    runs
-        Of a method that draws random numbers.
     method, kernel, settings
         As in `airlight study methods`; planes, froxels with and without history, a noisy march with it, by default.
     size
@@ -64,8 +61,8 @@ def motion(
             chosen,
             stimulus=stimulus,
             frames=frames,
-            turn=turn,
-            runs=runs,
+            turn=_TURN,
+            runs=_RUNS,
             progress=counted(tell),
         )
     columns = (
@@ -75,7 +72,7 @@ def motion(
         *words("verdict"),
     )
     title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
-    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=turn, runs=runs, rows=rows)
+    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=rows)
     return Study(
         name="motion", data=data, drawn=(table(title, columns, rows),), rows=tuple(rows), draw=partial(_draw, rows)
     )

@@ -23,7 +23,7 @@ class ViewState:
         words = ["airlight", name, self.scene]
         if name != "reference":
             words += ["--method", self.chosen.method]
-            words += ["--kernel", self.chosen.kernel] if self.chosen.kernel else []
+            words += ["--set", f"kernel={self.chosen.kernel}"] if self.chosen.kernel else []
             for parameter, value in self.chosen.parameters:
                 words += ["--set", f"{parameter}={value}"]
         for word in change_words(self.changes):

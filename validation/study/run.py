@@ -301,7 +301,7 @@ def _command(cell: Cell) -> str:
     """Return the command that shows the image of a cell again, as a shell reads it."""
     chosen = cell.chosen
     words = ["airlight", "view", cell.scene, "--method", chosen.method]
-    words += ["--kernel", chosen.kernel] if chosen.kernel else []
+    words += ["--set", f"kernel={chosen.kernel}"] if chosen.kernel else []
     for name, value in chosen.parameters:
         words += ["--set", f"{name}={value}"]
     for change in cell.medium:

@@ -222,12 +222,12 @@ def default_configurations() -> tuple[Configuration, ...]:
 
 def default_study(count: int) -> Study:
     """Return the study without a file: so many random scenes, every method once, 160 x 120 pixels."""
-    read_number("--random", count, 1, _MOST_SCENES)
+    read_number("study", count, 1, _MOST_SCENES)
     return Study(f"random-{count}", random=RandomScenes(count), configurations=default_configurations())
 
 
-def read_study(path: Path, *, count: int | None = None) -> Study:
-    """Return the study of a TOML file; `count` random scenes in place of those that it names, if given.
+def read_study(path: Path) -> Study:
+    """Return the study of a TOML file.
 
     Every name, type or value that a study cannot have is refused.
     """
@@ -240,10 +240,8 @@ def read_study(path: Path, *, count: int | None = None) -> Study:
         raise InputError(f"study {path}: it cannot be read: {error}") from error
     try:
         study = parse_study(data, folder=path.parent, name=path.stem)
-        if count is not None:
-            study = replace(study, random=replace(study.random, count=read_number("--random", count, 1, _MOST_SCENES)))
         if not study.scene_count:
-            raise InputError("it has no scene; give scenes = [...], or count in [random], or --random N")
+            raise InputError("it has no scene; give scenes = [...], or count in [random]")
     except InputError as error:
         raise InputError(f"study {path}: {error}") from error
     return study

@@ -116,7 +116,7 @@ def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on
     assert run(["report", "open-fog", "--method", "ray-march", "--set", "steps=32"]) == 0
     assert handed_on["scenes"] == ("open-fog",)
     assert _measured(handed_on) == [("ray-march", None, {"steps": 32})]
-    named = ["--method", "shadow-planes", "--method", "light-volumes", "--kernel", "taylor"]
+    named = ["--method", "shadow-planes", "--method", "light-volumes", "--set", "kernel=taylor"]
     assert run(["report", "open-fog", *named, "--set", "tolerance=0.01"]) == 0
     assert _measured(handed_on) == [
         ("shadow-planes", "taylor", {"tolerance": 0.01}),

@@ -69,7 +69,7 @@ def test_a_row_has_the_errors_and_what_they_cost():
     assert row.times.light_moved is None
     assert (row.times.frame.repetitions >= 1, row.cost.lights) == (True, 1)
     assert row.colour.ciede2000_max < 0.1
-    assert row.command == "airlight view sphere-spot --method shadow-planes --kernel exact --size 24x18"
+    assert row.command == "airlight view sphere-spot --method shadow-planes --set kernel=exact --size 24x18"
     assert row_values(row)["error.p99"] == row.error.p99
 
 
