@@ -29,18 +29,18 @@ Rooms:
 
 1. `scene/read_scene.py` reads what Mitsuba loaded: `scene/camera.py`, `scene/read_media.py` and `scene/lights.py` the
    parts, `scene/features.py` what of them asks for code, `scene/triangle_table.py` what shading needs of triangles.
-2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its parameters.
+2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its parameters, and later
+   the view of the rays that it renders.
 3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of lights.
 4. `methods/shadow_planes/method.py` prepares: `scene/mesh_adjacency.py` reads how triangles hang together,
    `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
    `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light.
 5. `frame/surface.py` casts the camera rays and shades what they meet, without shadows.
-6. `methods/interface/method.py` makes the view of these rays; `rays.py` says where each passes the
-   light, and a spot's cone.
+6. `rays.py` says where each ray of the view passes the light, and a spot's cone.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals.py`).
-8. The medium (`scene/media/homogeneous.py` of the protocol in `scene/media/medium.py`) is asked for the integral over
-   each interval and calls the kernel that `kernels/registry.py` has under a name: `kernels/exact.py`.
+8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the kernel that
+   `kernels/registry.py` has under a name: `kernels/exact.py`.
 9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings both to the host;
    `frame/light_on_ray.py` checks that all of it is finite.
 """

@@ -8,6 +8,7 @@ homogeneous cloud is one of density 1, without voxels: its stretches are the ste
 """
 
 from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -138,7 +139,4 @@ def leg_by_lengths(clouds: Clouds, lengths: Any) -> Callable[[Any, Any], tuple[A
 
 def least(depths: tuple[Any, ...]) -> Any:
     """Return the smallest of depths by channel [1]."""
-    smallest = depths[0]
-    for depth in depths[1:]:
-        smallest = dr.minimum(smallest, depth)
-    return smallest
+    return reduce(dr.minimum, depths)

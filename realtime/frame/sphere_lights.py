@@ -31,7 +31,7 @@ from realtime.methods.interface.method import Method, View, camera_view
 from realtime.numerics.array_types import aligned_array, types_of
 from realtime.numerics.recorded import Frozen
 from realtime.scene.lights import Facing
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.read_scene import Scene
 
 _AZIMUTHS, _ANGLES = 4, 8  # places for a ray

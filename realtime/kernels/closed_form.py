@@ -40,7 +40,7 @@ from realtime.kernels.quadrature import path_over_height
 from realtime.numerics.array_types import is_single, smallest
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import PHASES
 
 _EULER = 0.57721566490153286

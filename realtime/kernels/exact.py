@@ -81,7 +81,7 @@ from realtime.numerics.array_types import is_single
 from realtime.numerics.functions import LOG2_E, exp2_bounded, exp_bounded, sinh_bounded, unit_nodes
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Phase, Reach
 
 

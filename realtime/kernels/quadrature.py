@@ -35,8 +35,7 @@ from realtime.numerics.array_types import is_single, smallest
 from realtime.numerics.functions import exp_bounded
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
-from realtime.scene.media.medium import optical_reach
+from realtime.scene.media.medium import Homogeneous, optical_reach
 
 
 def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):

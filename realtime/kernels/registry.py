@@ -4,7 +4,7 @@
 A kernel is a function ``kernel(geometry, x0, x1, medium, light, **parameters) -> J [1/m]``. `geometry` is a
 `realtime.rays.RayGeometry`, ``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the
 result has one value per ray for a grey medium, a colour for a coloured one. The in-scattered radiance is ``albedo
-sigma_t intensity J / (4 pi)``. `realtime.scene.media.homogeneous` clips the segment to the cone of a spot before it
+sigma_t intensity J / (4 pi)``. `realtime.scene.media.medium` clips the segment to the cone of a spot before it
 calls the kernel; where the intensity falls off inside the cone (``light.varies``), the kernel weighs its integrand by
 `RayGeometry.falloff`.
 

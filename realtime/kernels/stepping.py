@@ -20,8 +20,7 @@ from realtime.numerics.array_types import smallest
 from realtime.numerics.functions import unit_nodes
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
-from realtime.scene.media.medium import OPTICAL_REACH
+from realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
 
 
 def uniform(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 100):

@@ -53,7 +53,7 @@ from realtime.numerics.array_types import four_numbers
 from realtime.numerics.functions import cell_of
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 
 
 def prepared_by(prepare: Callable[..., Any]) -> Callable[[Any], Any]:

@@ -47,7 +47,7 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import largest
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.media.published_form import ConstantLeg, bounded_by, tangent_series
 from realtime.scene.phase import PHASES, Phase, series_product
 

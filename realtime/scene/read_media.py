@@ -30,9 +30,8 @@ from realtime.scene.density import DensityGrid, density_on_device, read_cloud_de
 from realtime.scene.media.bounded import BoundedMedia, Clouds
 from realtime.scene.media.density_grid import GridMedium
 from realtime.scene.media.height_fog import HeightFog, Layer
-from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import BoundedMedium
-from realtime.scene.media.medium import Medium
+from realtime.scene.media.medium import Homogeneous, Medium
 from realtime.scene.mesh_adjacency import scene_of
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
 

@@ -13,7 +13,7 @@ from analytic.phase import PhaseFunction
 from realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Phase, named_phase
 from validation.kernels.case_files import Cases
 

@@ -22,7 +22,7 @@ from realtime.numerics.array_types import aligned_array
 from realtime.numerics.recorded import Frozen
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import named_phase
 from validation.clock import time_repeated, timing_of
 from validation.kernels.case_files import Cases

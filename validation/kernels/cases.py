@@ -18,7 +18,7 @@ from realtime.errors import InputError as RealtimeInputError
 from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays import RayGeometry, ray_geometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import named_phase
 from reference.storage.files import write_text
 from validation.kernels.case_files import Cases

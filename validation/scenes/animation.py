@@ -33,7 +33,7 @@ from realtime.scene.animate import (
     turned_objects,
     with_area_lights,
 )
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.mesh_adjacency import read_casters
 from realtime.scene.read_scene import Scene
 from validation.scenes.meshes import rotation

@@ -18,8 +18,7 @@ from realtime.methods.interface.method import View
 from realtime.numerics.array_types import host_numbers
 from realtime.scene.camera import read_camera
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
-from realtime.scene.media.medium import OPTICAL_REACH
+from realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
 from realtime.scene.phase import HenyeyGreenstein, Tabulated
 from realtime.scene.read_scene import Scene
 from realtime.shadow_maps.shadow_map import ShadowMap

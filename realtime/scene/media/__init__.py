@@ -27,8 +27,7 @@ infinity (`light.w == 0`) has an `axis`, its rays' direction, and is let in by
 
 Read in this order:
 
-- `medium.py`: the protocol, `Medium`, and rays with one light, `LitRays`;
-- `homogeneous.py`: one extinction everywhere, and the kernels;
+- `medium.py`: the protocol, `Medium`, rays with one light, `LitRays`, and the homogeneous medium, which asks kernels;
 - `height_fog.py`: density by height: optical depths and suns in closed form;
 - `density_grid.py`: density on a grid, marched;
 - `bounded.py`: homogeneous media with bounds, in clear air or in another; clouds;

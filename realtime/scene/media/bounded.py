@@ -16,8 +16,8 @@ import drjit as dr
 from realtime.errors import InputError
 from realtime.scene.density import Density
 from realtime.scene.media.bounded_rays import BoundedRays, camera_pieces, check_form
-from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.media.published_form import bounded_form
 from realtime.scene.phase import Phase
 

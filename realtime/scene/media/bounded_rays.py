@@ -62,9 +62,8 @@ from realtime.errors import InputError
 from realtime.numerics.array_types import chosen_value, is_single
 from realtime.numerics.functions import exp_bounded, unit_nodes
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
-from realtime.scene.media.medium import LitRays, Medium, Rays, optical_reach
+from realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach
 
 FORMS = ("exact", "paper", "printed")
 _NODES, _NODES_DOUBLE = 4, 6

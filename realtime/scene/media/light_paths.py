@@ -48,8 +48,7 @@ import mitsuba as mi
 from realtime.numerics.array_types import four_numbers
 from realtime.scene.convex_bounds import CELLS
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
-from realtime.scene.media.medium import Medium
+from realtime.scene.media.medium import Homogeneous, Medium
 
 _FAR = 1e30  #: e of no plane
 _FEW = 16  #: planes that are read faster than walked over

@@ -13,7 +13,7 @@ from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import named_phase
 from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 

@@ -13,7 +13,7 @@ from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays import RayGeometry, ray_geometry
 from realtime.scene.lights import Light, spot_fields
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from tests.helpers.kernel_values import (
     kernel_values,
     opaque,

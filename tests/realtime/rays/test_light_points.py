@@ -10,7 +10,7 @@ from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import array_types
 from realtime.rays import ray_geometry
 from realtime.scene.lights import Facing, Light
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import HenyeyGreenstein, Isotropic
 
 COUNT = 500

@@ -13,7 +13,7 @@ import pytest
 
 from realtime.methods.froxel_fog.accumulation import accumulated
 from realtime.methods.froxel_fog.grid import Grid, column_rays
-from realtime.scene.media.homogeneous import Homogeneous
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Isotropic
 from reference.scene.read import read_reference
 from tests.helpers import probes

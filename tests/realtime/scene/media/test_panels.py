@@ -10,8 +10,8 @@ from realtime.rays import ray_geometry
 from realtime.scene.convex_bounds import mesh_bounds
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import BoundedMedia
-from realtime.scene.media.homogeneous import Homogeneous
 from realtime.scene.media.light_paths import LightPaths
+from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Isotropic
 from realtime.scene.read_media import make_bounded_medium
 from tests.helpers.kernel_values import opaque, phase_of
