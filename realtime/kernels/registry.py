@@ -92,13 +92,6 @@ KERNELS: dict[str, Kernel] = {
         "Sun, Ramamoorthi, Narasimhan, Nayar 2005",
         MappingProxyType({"size": 64}),
     ),
-    "table-tail": Kernel(
-        "table-tail",
-        partial(table, form="tail"),
-        "two reads of scaled tails and heads, bilinear",
-        "realtime/kernels/table.py",
-        MappingProxyType({"size": 64}),
-    ),
     "closed-form": Kernel(
         "closed-form",
         closed_form,

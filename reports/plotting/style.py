@@ -57,7 +57,6 @@ _KERNELS = {
     "equiangular": ("orange", "<"),
     "uniform": ("orange", ">"),
     "table": ("sky", "P"),
-    "table-tail": ("sky", "X"),
     "closed-form": ("wine", "*"),
 }
 _OTHER_KERNEL = ("navy", "h")

@@ -17,7 +17,7 @@ from realtime.scene.read_scene import read_scene
 from tests.helpers.kernel_values import RAY, kernel_values
 from tests.helpers.scenes import tiny_scene
 
-REFUSED = {"table", "table-tail", "closed-form", "taylor", "taylor-printed"}
+REFUSED = {"table", "closed-form", "taylor", "taylor-printed"}
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,6 @@ def test_segments_without_length_are_dark(variant, name):
         ("quadrature", {"nodes": 0}, "nodes: got"),
         ("quadrature-theta", {"nodes": 0}, "nodes: got 0"),
         ("uniform", {"steps": 0}, "steps: got 0"),
-        ("table", {"form": "cubic"}, "form: got 'cubic'"),
         ("table", {"size": 1}, "size: got 1"),
     ],
 )
