@@ -37,6 +37,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.errors import InputError
+from realtime.image_filters import channels
 from realtime.methods.interface.method import Layers
 from realtime.numerics.array_types import Metres, PerRay, PerTile, aligned_array
 from realtime.scene.camera import SIDE, TILE, Camera
@@ -178,7 +179,7 @@ def _smooth(corners: Corners, distance: Metres, numbers: list[Any], masks: list[
     smooth = corners.inner & _depths_alike(distance, four)
     for corner in four:
         for bend, number in zip(bends, numbers):
-            limits, values = (_channels(dr.gather(type(part), part, corner)) for part in (bend, number))
+            limits, values = (channels(dr.gather(type(part), part, corner)) for part in (bend, number))
             for limit, value in zip(limits, values):
                 smooth &= limit <= tolerance * value
         for mask in masks:
@@ -191,11 +192,6 @@ def _between(number, corners: Corners, own, x, y):
     others = (dr.gather(mi.UInt32, tiles, own) for tiles in (corners.right, corners.below, corners.diagonal))
     base, across, down, diagonal = (dr.gather(type(number), number, tile) for tile in (own, *others))
     return dr.lerp(dr.lerp(base, across, x), dr.lerp(down, diagonal, x), y)
-
-
-def _channels(value) -> list[Any]:
-    """Return the channels of a colour, or a number as its only one."""
-    return list(value) if dr.depth_v(value) > 1 else [value]
 
 
 def _second_difference(corners: Corners, color):

@@ -66,14 +66,13 @@ def _check_light(camera: HostCamera, number: int, position: Array, distance: Any
             "in every pixel; move the light or the camera"
         )
     # In the plane at distance 1 a pixel has the sides `left` and `up`.
-    basis = np.stack([camera.left, camera.up, camera.forward], axis=1)
-    a, b, c = np.linalg.solve(basis, away)
+    c, a, b = np.linalg.solve(camera.basis, away)
     if c <= 0:
         return
     column, row = 0.5 * (camera.width - 1) - a / c, 0.5 * (camera.height - 1) - b / c
     nearest = np.clip(np.round([column, row]), 0, [camera.width - 1, camera.height - 1]).astype(int)
     across, upward = 0.5 * (camera.width - 1) - nearest[0], 0.5 * (camera.height - 1) - nearest[1]
-    ray = basis @ (across, upward, 1.0)
+    ray = camera.basis @ (1.0, across, upward)
     height = float(np.linalg.norm(np.cross(away, ray)) / np.linalg.norm(ray))
     ends = float(distance[nearest[1], nearest[0]])
     if height <= max(known, _ROUNDING * reach) and reach <= ends * (1 + 4 * _ROUNDING):

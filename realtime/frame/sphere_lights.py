@@ -29,6 +29,7 @@ from realtime.area_lights.shape import AreaLight
 from realtime.kernels.table import with_tables
 from realtime.methods.interface.method import Method, View, camera_view
 from realtime.numerics.array_types import aligned_array, types_of
+from realtime.numerics.functions import summed
 from realtime.numerics.recorded import Frozen
 from realtime.scene.lights import Facing
 from realtime.scene.media.medium import Homogeneous
@@ -78,8 +79,8 @@ def sphere_scales(scene: Scene, method: Method, kernel: Any) -> Frozen | None:
             return integral(normal, mi.Vector3d(normal)) * weight
 
         nothing = view.lit_by(light, own).nothing(dr.width(distance))
-        every = _summed(sphere.count, of_sample, nothing)
-        whole = _summed(mi.UInt32(_AZIMUTHS * _ANGLES), of_place, nothing)
+        every = summed(sphere.count, of_sample, nothing)
+        whole = summed(_AZIMUTHS * _ANGLES, of_place, nothing)
         return dr.select(every > 0, whole * Float(sphere.count) / every, 1)
 
     return Frozen(scale)
@@ -97,16 +98,6 @@ def sampled_sphere(light: AreaLight, points: LightPoints, Float: Any) -> Sampled
     )
     dr.make_opaque(made)
     return made
-
-
-def _summed(count, value, nothing):
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), nothing),
-        cond=lambda number, total: number < count,
-        body=lambda number, total: (number + 1, total + value(number)),
-        labels=("number", "total"),
-    )
-    return total
 
 
 def _places(view: View, sphere: SampledSphere):

@@ -13,11 +13,10 @@ singularity, which `realtime.kernels.quadrature` avoids.
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import smallest
-from realtime.numerics.functions import unit_nodes
+from realtime.numerics.functions import summed, unit_nodes
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
@@ -103,13 +102,7 @@ def _integrand(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t
 
 
 def _midpoints(term, begin, length, steps: int):
-    """Sum the midpoint rule in one loop, so that the kernel does not grow with the number of steps."""
-    Float = type(length)
-    width = length / steps
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), dr.zeros(Float, dr.width(width))),
-        cond=lambda index, total: index < steps,
-        body=lambda index, total: (index + 1, total + term(dr.fma(Float(index) + 0.5, width, begin))),
-        labels=("index", "total"),
-    )
-    return total * width
+    """Sum the midpoint rule."""
+    Float, width = type(length), length / steps
+    zero = dr.zeros(Float, dr.width(width))
+    return width * summed(steps, lambda index: term(dr.fma(Float(index) + 0.5, width, begin)), zero)

@@ -23,10 +23,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 
 from realtime.methods.interface.marching import marched_steps
 from realtime.methods.interface.method import Layers, Method, View, animate
+from realtime.numerics.functions import summed
 from realtime.numerics.noise import PATTERNS
 from realtime.parameters import parameter
 from realtime.scene.light_table import light_tables
@@ -87,17 +87,11 @@ class EquiAngular(Method):
             return sample(place, choice)
         Float = type(place)
 
-        def step(number, total):
+        def term(number):
             at = dr.fma(Float(number), _STEP, place)
-            return number + 1, total + sample(at - dr.floor(at), (Float(number) + choice) / self.samples)
+            return sample(at - dr.floor(at), (Float(number) + choice) / self.samples)
 
-        _, total = dr.while_loop(
-            state=(mi.UInt32(0), dr.zeros(type(like), dr.width(place))),
-            cond=lambda number, total: number < self.samples,
-            body=step,
-            labels=("number", "total"),
-        )
-        return total / self.samples
+        return summed(self.samples, term, dr.zeros(type(like), dr.width(place))) / self.samples
 
 
 def _sample(view: View, light: Light, at: Any) -> Any:

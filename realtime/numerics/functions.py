@@ -17,11 +17,12 @@ here.
 **Gauss-Legendre nodes as Python numbers: constants in the kernels that Dr.Jit records.**
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from realtime.numerics.array_types import is_single
@@ -161,6 +162,20 @@ def unit_nodes(count: int) -> tuple[tuple[float, float], ...]:
     """Return the nodes and weights of the Gauss-Legendre rule on [0, 1]; the weights add up to 1."""
     xi, weight = np.polynomial.legendre.leggauss(count)
     return tuple((float(0.5 + 0.5 * x), float(0.5 * w)) for x, w in zip(xi, weight))
+
+
+def summed(count: Any, term: Callable[[Any], Any], zero: Any) -> Any:
+    """Return the sum of `term(number)` over the numbers below `count`, in one loop: the kernel does not grow with them.
+
+    `zero` is the sum of nothing, one for each lane.
+    """
+    _, total = dr.while_loop(
+        state=(mi.UInt32(0), zero),
+        cond=lambda number, total: number < count,
+        body=lambda number, total: (number + 1, total + term(number)),
+        labels=("number", "total"),
+    )
+    return total
 
 
 def cell_of(position, count) -> tuple[Any, Any]:

@@ -86,6 +86,11 @@ class HostCamera:
     left: Any
     up: Any
 
+    @property
+    def basis(self) -> Any:
+        """`forward`, `left` and `up` as columns."""
+        return np.stack([self.forward, self.left, self.up], axis=1)
+
 
 def pixel_grid(width: int, height: int) -> PixelGrid:
     """Return the pixels of an image for a `Camera`."""

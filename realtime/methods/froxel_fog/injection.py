@@ -34,6 +34,7 @@ import mitsuba as mi
 from realtime.methods.froxel_fog.grid import Grid
 from realtime.methods.interface.method import View
 from realtime.numerics.array_types import PerRay
+from realtime.numerics.functions import summed
 from realtime.rays import profile
 from realtime.scene.light_points import LightFrame, frame_at
 from realtime.scene.lights import Light
@@ -134,7 +135,7 @@ def _sum_over_points(view: View, table: LightPointTable, like: Light, points: Fr
     """
     medium = view.medium
 
-    def step(number, total):
+    def term(number):
         frame = frame_at(table.frames, number)
         away = points.point - frame.position
         a, b, c = frame.local(away)
@@ -147,16 +148,9 @@ def _sum_over_points(view: View, table: LightPointTable, like: Light, points: Fr
             lit = view.visible(points.point, frame) if table.maps is None else table.maps.lit(number, (a, b, c))
             value = dr.select(lit, value, 0)
         depths = medium.depth_to_light(frame, points.point, square * inverse)
-        return number + 1, total + value * medium.transmittance(depths)
+        return value * medium.transmittance(depths)
 
-    Value = type(view.lit_by(like).nothing(1))
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), dr.zeros(Value, dr.width(points.point))),
-        cond=lambda number, total: number < table.count,
-        body=step,
-        labels=("number", "total"),
-    )
-    return total
+    return summed(table.count, term, view.lit_by(like).nothing(dr.width(points.point)))
 
 
 def _least_square(grid: Grid, begin: Any, end: Any) -> Any:

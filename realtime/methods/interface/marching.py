@@ -21,6 +21,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from realtime.numerics.functions import summed
 from realtime.scene.media.medium import LitRays
 
 _LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
@@ -82,17 +83,11 @@ def midpoint_sum(steps: Steps, count: int, zero: Any, sample: Callable[[Any], An
     """
     Float = type(steps.width)
 
-    def step(index, total):
+    def term(index):
         x = steps.place(dr.fma(Float(index) + shift, steps.width, steps.begin))
-        return index + 1, total + sample(x) * steps.stretch(x)
+        return sample(x) * steps.stretch(x)
 
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), zero + dr.zeros(Float, dr.width(steps.width))),
-        cond=lambda index, total: index < count,
-        body=step,
-        labels=("index", "total"),
-    )
-    return total * steps.width
+    return summed(count, term, zero + dr.zeros(Float, dr.width(steps.width))) * steps.width
 
 
 def marched_integral(

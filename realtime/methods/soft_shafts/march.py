@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 
 from realtime.methods.interface.marching import midpoint_sum, steps_between
 from realtime.methods.interface.method import View
 from realtime.methods.soft_shafts.light_sources import SourceState
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
+from realtime.numerics.functions import summed
 from realtime.scene.light_points import frame_at
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
@@ -47,16 +47,7 @@ def integral_of_points(
     if share is not None:
         return points * _of_point(view, state, share.number, share.shift, p)
 
-    def add(number: Any, total: Any):
-        return number + 1, total + _of_point(view, state, number, Float(0.5), p)
-
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), nothing),
-        cond=lambda number, total: number < points,
-        body=add,
-        labels=("number", "total"),
-    )
-    return total
+    return summed(points, lambda number: _of_point(view, state, number, Float(0.5), p), nothing)
 
 
 def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftShaftsParameters) -> Any:

@@ -60,7 +60,7 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import chosen_value, is_single
-from realtime.numerics.functions import exp_bounded, unit_nodes
+from realtime.numerics.functions import exp_bounded, summed, unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
 from realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach
@@ -343,13 +343,8 @@ def _published_sum(ray: BoundedRays, piece: Piece, x0, x1):
     if len(segments) == 1:
         return integral(x0, x1)
     # A loop: the integral is long, and its code need not be there for each segment.
-    _, total = dr.while_loop(
-        state=(mi.UInt32(0), dr.zeros(Color, dr.width(ray.geometry.height, x0, x1))),
-        cond=lambda number, total: number < len(segments),
-        body=lambda number, total: (
-            number + 1,
-            total + integral(*(chosen_value(ends, number) for ends in zip(*segments, strict=True))),
-        ),
-        labels=("number", "total"),
+    return summed(
+        len(segments),
+        lambda number: integral(*(chosen_value(ends, number) for ends in zip(*segments, strict=True))),
+        dr.zeros(Color, dr.width(ray.geometry.height, x0, x1)),
     )
-    return total

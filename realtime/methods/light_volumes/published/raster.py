@@ -41,7 +41,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.methods.light_volumes.published.mesh import VolumeMesh
-from realtime.scene.camera import Camera, row_and_column
+from realtime.scene.camera import Camera, ray_directions, read_camera
 
 BATCH = 1 << 22  #: lanes of one batch: some 0.3 GB
 
@@ -86,15 +86,6 @@ def signed_crossings(mesh: VolumeMesh, camera: Camera, *, batch: int = BATCH) ->
                 yield _crossings(spans, camera, span, column)
 
 
-def _camera_basis(camera: Camera):
-    """Return origin and (forward, left, up) as columns, in float64."""
-
-    def read(vector):
-        return np.array(vector, dtype=np.float64).ravel()
-
-    return read(camera.origin), np.stack([read(axis) for axis in camera.axes], axis=1)
-
-
 def _opaque(values):
     """Return a vector of which no kernel knows the value, so that none is compiled again when it changes."""
     return mi.Vector3d(*(dr.opaque(mi.Float64, float(component)) for component in values))
@@ -102,13 +93,13 @@ def _opaque(values):
 
 def _project(vertices, camera: Camera):
     """Return (a, b, z, w) of all vertices, one after the other, in float64."""
-    origin, basis = _camera_basis(camera)
-    depth, left, up = np.linalg.inv(basis)
+    host = read_camera(camera)
+    depth, left, up = np.linalg.inv(host.basis)
     to_column, to_row = 0.5 * (camera.width - 1) * depth - left, 0.5 * (camera.height - 1) * depth - up
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     number = dr.arange(mi.UInt32, len(vertices))
     vertex = dr.gather(mi.Vector4d, mi.Float64(vertices.ravel()), number)
-    offset = dr.fma(_opaque(-origin), vertex.w, mi.Vector3d(vertex.x, vertex.y, vertex.z))
+    offset = dr.fma(_opaque(-host.origin), vertex.w, mi.Vector3d(vertex.x, vertex.y, vertex.z))
     seen = [dr.dot(_opaque(line), offset) for line in (to_column, to_row, depth)]
     screen = dr.empty(mi.Float64, 4 * len(vertices))
     dr.scatter(screen, mi.Vector4d(*seen, vertex.w), number)
@@ -189,7 +180,7 @@ def _spans(screen, corners, camera: Camera, row_ranges, owner, rank) -> _Spans:
     last = _inverse_depth(left, right, mi.Float64(end - 1))
     step = (last - inverse) / dr.maximum(mi.Float64(count) - 1, 1)
     # Seen from behind the normal, a triangle goes down on its right.
-    handedness = float(np.sign(np.linalg.det(_camera_basis(camera)[1])))
+    handedness = float(np.sign(np.linalg.det(read_camera(camera).basis)))
     sign = dr.select(up_is_left, mi.Float64(handedness), -handedness)
     spans = _Spans(mi.UInt32(count), row * camera.width + mi.UInt32(begin), sign, inverse, step)
     dr.eval(spans.count, spans.pixel, spans.sign, spans.inverse, spans.step)
@@ -246,8 +237,4 @@ def _crossings(spans: _Spans, camera: Camera, span, step) -> Crossings:
     pixel = dr.gather(mi.UInt32, spans.pixel, span) + step
     first, change, sign = (dr.gather(mi.Float64, column, span) for column in (spans.inverse, spans.step, spans.sign))
     inverse = dr.maximum(dr.fma(mi.Float64(step), change, first), 0)
-    row, column = row_and_column(camera, pixel)
-    across = 0.5 * (camera.width - 1) - mi.Float64(column)
-    upward = 0.5 * (camera.height - 1) - mi.Float64(row)
-    forward, left, up = (_opaque(column) for column in _camera_basis(camera)[1].T)
-    return Crossings(pixel, dr.norm(forward + left * across + up * upward) / inverse, sign)
+    return Crossings(pixel, dr.norm(ray_directions(camera, pixel)[1]) / inverse, sign)
