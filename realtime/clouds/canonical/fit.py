@@ -318,14 +318,11 @@ class DeviceFit:
     def __call__(self, set_number: int, t, d, mu, cos_phi, sin_phi, mu_l):
         """Return T [1/sr], c_x, c_y, sigma [mean free paths]."""
         table = self.tables[set_number]
-        low, high = np.log(np.array([coordinates.THINNEST, coordinates.THICKEST]) + coordinates.THICKNESS_SHIFT)
-        low_sun = coordinates.lowest_sun_coordinate()
         t = dr.clip(t, coordinates.THINNEST, coordinates.THICKEST)
         d = dr.clip(d, 0, t)
         sun = dr.clip(mu_l, coordinates.LOWEST_SUN, 1)
         phi_l = dr.acos(sun)
-        at_t = (dr.log(t + coordinates.THICKNESS_SHIFT) - low) / (high - low)
-        at_sun = (dr.sqrt(dr.asin(sun) * (2 / np.pi)) - low_sun) / (1 - low_sun)
+        at_t, _, at_sun = coordinates.place_shares(t, d, sun)
         at_mu = _direction_share(dr.clip(mu, -1, 1))
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
         (p,) = between_entries(table["p"], [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1)
