@@ -4,7 +4,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,38 +24,55 @@ _USUAL = 100  # random scenes of a study without a file
 _EVERY = 300.0  # between two times that the Parquet is written while rows come [s]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
+class Problem:
+    """A cell that failed, hung, aborted or was lost."""
+
+    scene: str
+    label: str
+    status: str
+    reason: str | None
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
 class SweepRun(Result):
     """What became of the cells of a sweep."""
 
-    summary: Mapping[str, Any]
+    study: str
+    scenes: int
+    cells: int
+    cached: int
+    computed: int
+    timed_alone: int
+    counts: Mapping[str, int]  #: cells that ended so
+    left: int
+    problems: tuple[Problem, ...]
+    output: str  #: folder
+    parquet: str | None
 
-    def to_dict(self) -> Mapping[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return what `airlight sweep --json` prints."""
-        return self.summary
+        return asdict(self)
 
     @property
     def passed(self) -> bool:
         """Whether no cell failed, hung or aborted, and none is left."""
-        return not (self.summary["problems"] or self.summary["left"])
+        return not (self.problems or self.left)
 
     @property
     def title(self) -> str:
         """How many cells of how many scenes."""
-        said = self.summary
-        return f"{said['output']}: {said['cells']} cells of {said['scenes']} scenes"
+        return f"{self.output}: {self.cells} cells of {self.scenes} scenes"
 
     @property
     def lines(self) -> Sequence[str]:
         """The counts, the problems and what to do next."""
-        said = self.summary
-        lines = [self.title, f"  {said['cached']} were there, {said['computed']} computed, {said['left']} left"]
-        lines += [f"  {said['timed_alone']} timed alone"] if said["timed_alone"] else []
-        lines += [f"  {status}: {number}" for status, number in sorted(said["counts"].items())]
-        for each in said["problems"]:
-            lines.append(f"  {each['status']}: {each['scene']}, {each['label']}: {each['reason']}")
-        if said["parquet"]:
-            lines += [f"  rows in {said['parquet']}", f"  what they say: airlight sweep --from {said['output']}"]
+        lines = [self.title, f"  {self.cached} were there, {self.computed} computed, {self.left} left"]
+        lines += [f"  {self.timed_alone} timed alone"] if self.timed_alone else []
+        lines += [f"  {status}: {number}" for status, number in sorted(self.counts.items())]
+        lines += [f"  {each.status}: {each.scene}, {each.label}: {each.reason}" for each in self.problems]
+        if self.parquet:
+            lines += [f"  rows in {self.parquet}", f"  what they say: airlight sweep --from {self.output}"]
         return lines
 
 
@@ -91,7 +108,7 @@ class SweepFindings(Result):
         """Return the claims, the table and the page."""
         from reports.sweep.summary import headlines
 
-        claims = "".join(f"- {each['kind']}: {sentence_in_text(each['text'])}\n" for each in headlines(self.said))
+        claims = "".join(f"- {each.kind}: {sentence_in_text(each.text)}\n" for each in headlines(self.said))
         return claims + super().text(width=width, styled=styled)
 
 
@@ -151,19 +168,18 @@ def sweep(
     folder = Path(output or f"sweep-{chosen.name}")
     variant = activate()
     with RowStore(folder) as store:
-        summary = _run(chosen, store, place, variant=variant, progress=progress)
-        summary["parquet"] = str(store.write_parquet()) if len(store) else None
-    return SweepRun(summary)
+        ran = _run(chosen, store, place, variant=variant, progress=progress)
+        return replace(ran, parquet=str(store.write_parquet()) if len(store) else None)
 
 
-def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any) -> dict[str, Any]:
+def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any) -> SweepRun:
     """Compute what is missing, add it to the store, and return what came of it."""
     from reports import __version__
     from reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
     from validation.study.keys import made_here, scene_identities
 
     made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
-    problems: list[dict[str, Any]] = []
+    problems: list[Problem] = []
 
     def with_errors(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
         value = outcome.value if outcome.status == "done" else row_without_numbers(cell, key, outcome)
@@ -186,18 +202,19 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, pro
         where = replace(place, workers=1) if place.workers else place
         untimed, timed = part(where, timing_groups, with_times)
     total, computed = study.scene_count * study.cells_by_scene, counts.total() - counts["lost"]
-    return {
-        "study": study.name,
-        "scenes": study.scene_count,
-        "cells": total,
-        "cached": total - missing,
-        "computed": computed,
-        "timed_alone": timed["done"],
-        "counts": dict(counts),
-        "left": missing - computed + untimed - (timed.total() - timed["lost"]),
-        "problems": problems,
-        "output": str(store.folder),
-    }
+    return SweepRun(
+        study=study.name,
+        scenes=study.scene_count,
+        cells=total,
+        cached=total - missing,
+        computed=computed,
+        timed_alone=timed["done"],
+        counts=dict(counts),
+        left=missing - computed + untimed - (timed.total() - timed["lost"]),
+        problems=tuple(problems),
+        output=str(store.folder),
+        parquet=None,
+    )
 
 
 def _part(
@@ -208,7 +225,7 @@ def _part(
     row_from: Callable[..., dict[str, Any]],
     *,
     made: "Made",
-    problems: list[dict[str, Any]],
+    problems: list[Problem],
     progress: Any,
     quick: bool,
 ) -> tuple[int, Counter[str]]:
@@ -234,8 +251,7 @@ def _part(
                 store.add(row_from(cell, key, outcome))
             counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
             if outcome.status not in ("done", "refused"):
-                what = {"scene": cell.scene, "label": cell.chosen.label, "status": outcome.status}
-                problems.append(what | {"reason": outcome.reason})
+                problems.append(Problem(cell.scene, cell.chosen.label, outcome.status, outcome.reason))
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()
                 written = time.monotonic()

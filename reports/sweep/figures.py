@@ -5,8 +5,8 @@ A sweep has a thousand scenes and a dozen configurations or more. No panel tells
 configuration has a line of its own.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 WIDTH = 10.2  #: of a figure [inches]; the page scales it
 _EXACT = 1e-8  #: errors below are drawn here: float32 cannot tell them from none
 _WRONG = 1e3  #: errors above are drawn here: a series that left its range has 1e22, and no other point could be told
+_LABEL = 38  # letters of a label, which may be a path of a user's: room is left for the panel
 _DOTS = 160  #: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
 
 ERROR = "relative RMSE of the airlight [1]"
@@ -40,7 +41,7 @@ def distribution(said: Summary) -> "Figure | None":
     shown.sort(key=lambda sample: float(np.median(_errors(sample))))
     figure = _figure(0.26 * len(shown) + 1.0)
     panel = figure.subplots()
-    styles = _styles(said)
+    styles = report_styles(said.samples)
     for place, sample in enumerate(shown):
         errors, colour = _errors(sample), styles[sample.label]["color"]
         low, first, middle, third, high = np.quantile(errors, (0.05, 0.25, 0.5, 0.75, 0.95), method="nearest")
@@ -69,7 +70,7 @@ def medians(said: Summary) -> "Figure | None":
         return None
     figure = _figure(4.0 + 0.16 * -(-len(shown) // 3))
     panel = figure.subplots()
-    styles = _styles(said)
+    styles = report_styles(said.samples)
     for sample in shown:
         times, errors = _points(sample)
         (x0, x, x1), (y0, y, y1) = (np.quantile(each, (0.25, 0.5, 0.75), method="nearest") for each in (times, errors))
@@ -78,22 +79,16 @@ def medians(said: Summary) -> "Figure | None":
     panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
     plain_times(panel)
     panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-    handles = [panel.plot([], [], label=_cut(s.label), **(styles[s.label] | {"linestyle": "none"}))[0] for s in shown]
+    keys = {short(each.label, _LABEL): styles[each.label] | {"linestyle": "none"} for each in shown}
+    handles = [panel.plot([], [], label=label, **style)[0] for label, style in keys.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
-#: Every figure by its name: what draws it, and what its files and its place on the page are called.
-FIGURES: Mapping[str, Callable[[Summary], "Figure | None"]] = {
-    "sweep-errors": distribution,
-    "sweep-medians": medians,
-}
-
-
-def drawn(said: Summary, names: Sequence[str] = tuple(FIGURES)) -> Iterator[tuple[str, "Figure"]]:
-    """Yield the figures of these names, of `FIGURES`, that the sweep has data for."""
-    for name in names:
-        figure = FIGURES[name](said)
+def drawn(said: Summary) -> Iterator[tuple[str, "Figure"]]:
+    """Yield the figures that the sweep has data for, with the names of their files and their places on the page."""
+    for name, draw in (("sweep-errors", distribution), ("sweep-medians", medians)):
+        figure = draw(said)
         if figure is not None:
             yield name, figure
 
@@ -104,33 +99,19 @@ def _figure(height: float) -> "Figure":
     return figure
 
 
-def _styles(said: Summary) -> dict[str, dict[str, Any]]:
-    """Return the styles of the configurations: those of the report, one colour and marker a method."""
-    return report_styles(said.samples)
-
-
 def _errors(sample: Sample) -> Numbers:
     """Return the finite errors of a configuration, within what is drawn."""
-    return _within(sample.errors[np.isfinite(sample.errors)])
-
-
-def _within(errors: Numbers) -> Numbers:
-    return np.clip(errors, _EXACT, _WRONG)
+    return np.clip(sample.errors[np.isfinite(sample.errors)], _EXACT, _WRONG)
 
 
 def _points(sample: Sample) -> tuple[Numbers, Numbers]:
     """Return times and errors of the scenes that have both."""
     both = np.isfinite(sample.times) & np.isfinite(sample.errors)
-    return sample.times[both], _within(sample.errors[both])
+    return sample.times[both], np.clip(sample.errors[both], _EXACT, _WRONG)
 
 
 def _with_count(sample: Sample) -> str:
     """Return the name of a configuration, and how many of its scenes have no place in the figure."""
     away = {"refused": sample.count("refused"), "infinite": int(np.isinf(sample.errors).sum())}
     words = ", ".join(f"{count} {what}" for what, count in away.items() if count)
-    return f"{_cut(sample.label)}{f' [{words}]' if words else ''}"
-
-
-def _cut(name: str) -> str:
-    """Return a name that leaves room for a panel: that of a user method may be a path."""
-    return short(name, 38)
+    return f"{short(sample.label, _LABEL)}{f' [{words}]' if words else ''}"

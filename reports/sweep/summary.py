@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from reports.data.records import Claim as Headline
 from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
 from reports.sweep.correlations import Correlation, correlations, property_words, strongest
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
@@ -88,12 +89,12 @@ def finite_median(values: Numbers) -> float | None:
     return median if np.isfinite(median) else None
 
 
-def headlines(said: Summary) -> list[dict[str, Any]]:
-    """Return what a reader should know first, as claims with `kind`, `text` and `good`, as report.json has them."""
-    made: list[dict[str, Any]] = []
+def headlines(said: Summary) -> list[Headline]:
+    """Return what a reader should know first."""
+    made: list[Headline] = []
 
     def add(kind: str, text: str, good: bool | None = None) -> None:
-        made.append({"kind": kind, "text": text, "good": good})
+        made.append(Headline(kind=kind, text=text, good=good))
 
     for target in TARGETS:
         best = best_claims(said.claims, target)
@@ -167,7 +168,7 @@ def to_json(said: Summary) -> dict[str, Any]:
         "drawn_at_random": said.drawn,
         "level": LEVEL,
         **{name: plain(getattr(said, name)) for name in (*counts, "versions", "started", "worst", *lists)},
-        "headlines": headlines(said),
+        "headlines": plain(headlines(said)),
         "claims": [plain(each) | {"share": each.share, "text": each.text} for each in said.claims],
         "configurations": [_configuration(sample) for sample in said.samples],
         "fastest": [plain(each) | {"counts": dict(zip(names, each.counts))} for each in said.fastest],
@@ -177,17 +178,21 @@ def to_json(said: Summary) -> dict[str, Any]:
     }
 
 
-def quantiles(errors: Numbers, probabilities: Sequence[float] = (0.5, 0.95)) -> list[dict[str, float | None]]:
-    """Return quantiles of the errors of a configuration with their intervals; None for infinite ones."""
+@dataclass(frozen=True)
+class Quantile:
+    """A quantile of the errors of a configuration, with its interval; None for infinite ones."""
+
+    probability: float
+    value: float | None
+    low: float | None
+    high: float | None
+
+
+def quantiles(errors: Numbers, probabilities: Sequence[float] = (0.5, 0.95)) -> list[Quantile]:
+    """Return quantiles of the errors of a configuration; none if nothing was measured."""
     known = errors[~np.isnan(errors)]
-    if not len(known):
-        return []
-    made = []
-    for probability in probabilities:
-        ends = quantile_interval(known, probability)
-        value, low, high = (end if end is not None and np.isfinite(end) else None for end in ends)
-        made.append({"probability": probability, "value": value, "low": low, "high": high})
-    return made
+    ends = ((each, quantile_interval(known, each)) for each in probabilities if len(known))
+    return [Quantile(each, *(plain(end) for end in found)) for each, found in ends]
 
 
 def _configuration(sample: Sample) -> dict[str, Any]:
@@ -196,7 +201,7 @@ def _configuration(sample: Sample) -> dict[str, Any]:
         "method": sample.method,
         "scenes": len(sample.scenes),
         "statuses": dict(Counter(sample.statuses)),
-        "relative_rmse": quantiles(sample.errors),
+        "relative_rmse": plain(quantiles(sample.errors)),
         "frame_ms": finite_median(sample.times),
         "timed_alone": int(np.isfinite(sample.times).sum()),
     }

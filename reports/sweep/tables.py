@@ -39,8 +39,8 @@ def errors_table(said: Summary) -> Table:
             "refused": sample.count("refused"),
             "untold": sample.count(UNTOLD),
             "lost": sample.count(*FAULTS),
-            "median": values[0]["value"] if values else None,
-            "most": values[1]["value"] if values else None,
+            "median": values[0].value if values else None,
+            "most": values[1].value if values else None,
         }
         for claim in said.claims:
             if claim.label == sample.label and claim.share is not None:

@@ -4,10 +4,7 @@
 import os
 import shutil
 import sys
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    pass
+from typing import Any
 
 
 def colours_wanted() -> bool:
