@@ -22,14 +22,14 @@ from realtime.methods.shader.source import is_shader
 from reference.storage.files import NO_SPACE, ensure_folder
 from reference.storage.kept import fresh_results
 from reports.data.reader import record_of, report_text
-from reports.data.records import SCHEMA, Environment, Kernel, Measured, Report, Settings
+from reports.data.records import SCHEMA, Environment, Kernel, Measured, Report, Scaling, Settings
 from reports.machine.environment import describe_environment, machine, threads
 from reports.machine.opengl import require_opengl
 from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Progress, part_of
 from reports.page.render import render_page
 from reports.report.claims import claims, growth_claims, own_fault, unstudied
-from reports.report.others import other_parts, paper_rows, scaling_records, shares
+from reports.report.others import other_parts, paper_rows, shares
 from reports.report.scene import folder_of, write_scene
 from validation.scenes.loading import scene_stem
 from validation.scenes.random.design import is_random
@@ -121,7 +121,7 @@ def write_report(
                 found = part.result(part_of(progress, *span, before=f"{part.title}, "))
             by_kind.setdefault(part.kind, []).append(found)
             results.append(found)
-        scaling = [each for found in by_kind.get("scaling", ()) for each in scaling_records(found.data["scaling"])]
+        scaling = [record_of(each, Scaling) for found in by_kind.get("scaling", ()) for each in found.data["scaling"]]
         usual = study.name in STUDIES and names == standard_study(study.name).scenes
         kernels = [each for found in by_kind.get("stability", ()) for each in found.data["kernels"]]
         kept, made = sum(result.cached for result in results), sorted(result.made for result in results)

@@ -4,14 +4,11 @@
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from reference.storage.kept import is_kept, key_of
-from reports.data.reader import record_of
-from reports.data.records import Scaling
 from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
@@ -20,8 +17,6 @@ from validation.papers.claims import EFFORTS, Claim, Judged, claims, experiments
 from validation.study.results import Computed, Result, cached_result
 from validation.study.study import Study, standard_study
 
-_GROWING = "colonnade"  # of which times are measured as its work grows
-_GROWING_SIZE = (400, 300)  # of its images [pixels]
 _STABILITY, _GROWTH = 20.0, 80.0  # that these take [s]
 _LEAST = 0.01  # to read a kept result [s]
 
@@ -54,7 +49,7 @@ def other_parts(study: Study) -> list[OtherPart]:
 
         key = key_of("report-stability", stability, rays=study.stability)
         parts.append(OtherPart("stability", "stability", key, _STABILITY, partial(_stability, study.stability)))
-    if _GROWING in study.scenes:
+    if study.growth and set(standard_study("scaling").scenes) <= set(study.scenes):
         parts += [_scaling(kind, study.measure.seconds) for kind in study.growth]
     if study.name in EFFORTS and set(standard_study(study.name).scenes) <= set(study.scenes):
         parts += [_paper(name) for name in experiments_of(claims(), study.name)]
@@ -94,24 +89,18 @@ def known_kernels(rays: int) -> list[dict[str, Any]]:
 
 def _scaling(kind: str, seconds: float) -> OtherPart:
     """Return how times grow with one kind of work."""
-    from validation.study.growth import METHODS, study_scaling
+    from validation.study.growth import study_growth
     from validation.study.ladders import ladder
 
+    usual = standard_study("scaling")
+    study = replace(usual, measure=replace(usual.measure, seconds=seconds))
+
     def compute(progress: Progress) -> Computed:
-        steps = ladder(kind, _GROWING, _GROWING_SIZE)
-        found = study_scaling(kind, steps, METHODS, seconds=seconds, progress=counted(progress))
-        return {"scaling": found}, {}
+        steps = ladder(kind, study.scenes[0], study.sizes[0])
+        return {"scaling": study_growth(study, kind, steps, progress=counted(progress))}, {}
 
-    identity = {"scene": _GROWING, "size": _GROWING_SIZE, "kind": kind, "seconds": seconds}
-    key = key_of("report-scaling", study_scaling, ladder, machine=machine(), **identity)
+    key = key_of("report-scaling", study_growth, ladder, machine=machine(), kind=kind, study=study)
     return OtherPart("scaling", "how times grow", key, _GROWTH, compute)
-
-
-def scaling_records(
-    found: Sequence[Mapping[str, Any]], name: str = _GROWING, size: tuple[int, int] = _GROWING_SIZE
-) -> list[Scaling]:
-    """Return how methods grow with one kind of work, in a scene with images of a size [pixels]."""
-    return [record_of({"scene": Path(name).stem, "size": size, **each}, Scaling) for each in found]
 
 
 # --- claims of papers ------------------------------------------------------------------------------------------------

@@ -23,15 +23,16 @@ from reports.api.inputs import (
     telling,
 )
 from reports.machine.progress import counted, part_of
+from reports.studies.methods import cells_of, check_study, loaded_scenes, scene_by_scene
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import numbers, table
 
 
 @one_error
 def scaling(
-    scenes: Scenes = ("colonnade",),
+    scenes: Scenes = (),
     *,
-    kinds: Words = "size,triangles,lights,map",
+    kinds: Words | None = None,
     method: Methods = (),
     size: Size = (800, 600),
     progress: Progress = None,
@@ -44,9 +45,9 @@ def scaling(
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files.
+        Built-in scenes, random:SEED and Mitsuba XML files; colonnade by default.
     kinds
-        What grows: some of size,triangles,lights,media,map.
+        What grows: some of size,triangles,lights,media,map; all but media by default.
     method
         A method, as in `airlight study methods`; by default one configuration of each method with shadows.
     size
@@ -54,32 +55,33 @@ def scaling(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from validation.study.ladders import KINDS, ladder
-
-    wanted = listed("kinds", kinds)
-    for kind in wanted:
-        if kind not in KINDS:
-            raise InputError(f"kinds: got {kind!r}, wanted some of {','.join(KINDS)}")
-    names = [str(name) for name in several(scenes)]
     from reports.machine.environment import activate
 
     activate()
     from reports.api.render import asked_configurations
-    from reports.report.others import scaling_records
+    from reports.data.reader import record_of
+    from reports.data.records import Scaling
     from reports.tables.scaling import cliffs, scaling_tables
-    from validation.study.growth import METHODS, study_scaling
+    from validation.study.growth import study_growth
+    from validation.study.ladders import ladder
+    from validation.study.study import GROWTH, standard_study
 
-    chosen, _ = asked_configurations(method, (), (), usual=METHODS)
-    pixels = pixels_of(size)
-    assert pixels is not None
+    usual = standard_study("scaling")
+    wanted = usual.growth if kinds is None else listed("kinds", kinds)
+    for kind in wanted:
+        if kind not in GROWTH:
+            raise InputError(f"kinds: got {kind!r}, wanted some of {','.join(GROWTH)}")
+    chosen, _ = asked_configurations(method, (), (), usual=usual.configurations)
+    study = replace(usual.at(pixels_of(size)), configurations=tuple(chosen))
+    names = [str(name) for name in several(scenes)] or usual.scenes
     # Scenes that have nothing of a kind are refused before an hour of work, not after.
-    ladders = [(name, kind, ladder(kind, name, pixels)) for name in names for kind in wanted]
+    ladders = [(name, kind, ladder(kind, name, study.sizes[0])) for name in names for kind in wanted]
     records: list[Any] = []
     with telling(progress, "scaling") as tell:
         for at, (name, kind, steps) in enumerate(ladders):
             part = part_of(tell, at / len(ladders), (at + 1) / len(ladders))
-            found = study_scaling(kind, steps, chosen, progress=counted(part))
-            records += scaling_records(found, name, pixels)
+            found = study_growth(replace(study, scenes=(name,)), kind, steps, progress=counted(part))
+            records += [record_of(each, Scaling) for each in found]
     return Study(
         name="scaling",
         data=with_environment(scaling=[asdict(each) for each in records]),
@@ -120,6 +122,7 @@ def _draw_scaling(records: list[Any], column: str) -> Any:
 
 # The size of the shadow map
 
+_FEW = "has too few values above 0"
 _SHARES = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=FRACTION)
 
 
@@ -127,9 +130,9 @@ _SHARES = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", 
 def map_size(
     scenes: Scenes = (),
     *,
-    method: MethodLike = "light-volumes",
+    method: MethodLike | None = None,
     settings: Values = (),
-    sizes: Words = "32,64,128,256,512,1024,2048,4096",
+    sizes: Words | None = None,
     size: Size = (160, 120),
     progress: Progress = None,
 ) -> Study:
@@ -142,23 +145,32 @@ def map_size(
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files; all built-in scenes for fog by default.
     method
-        A method with a shadow map.
+        A method with a shadow map, light-volumes by default.
     settings
         NAME=VALUE, a parameter of the method; may be given several times. Choose them so that errors of other causes
         are well below the error of the largest map.
     sizes
-        Sizes of the shadow map [texels], with commas.
+        Sizes of the shadow map [texels], with commas; 32 to 4096 by default.
     size
         Width and height of the image [pixels], or WxH.
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from realtime.shadow_maps.shadow_map import check_size
     from reports.machine.environment import activate
-    from validation.study.configuration import parse_settings
 
+    activate()
+    from realtime.scene.read_scene import read_scene
+    from realtime.shadow_maps.shadow_map import check_size
+    from reports.api.render import checked_configuration
+    from validation.metrics.errors import plain
+    from validation.study.configuration import parse_settings, prepared
+    from validation.study.growth import fitted_exponent
+    from validation.study.study import standard_study
+
+    usual = standard_study("map-size")
     try:
-        texels = sorted({int(word) for word in listed("sizes", sizes)})
+        asked = [each.parameters[0][1] for each in usual.configurations] if sizes is None else listed("sizes", sizes)
+        texels = sorted({int(word) for word in asked})
     except ValueError:
         raise InputError(f"sizes: got {sizes!r}, wanted sizes in texels, for example 128,256,512") from None
     for each in texels:
@@ -166,85 +178,36 @@ def map_size(
     parameters = dict(settings) if isinstance(settings, Mapping) else parse_settings(several(settings))
     if "map" in parameters:
         raise InputError(f"set: got map={parameters['map']}, wanted it in sizes: the map's size is what varies")
-    pixels = pixels_of(size)
-    from reports.api.render import checked_configuration
-
-    largest, apart = checked_configuration(method, None, parameters | {"map": texels[-1]})
-    activate()
-    call: Any = _map_study
-    if apart:
-        from reports.machine.own_process import in_own_process
-
-        call = partial(in_own_process, _map_study, name=largest.method)
-        progress = progress is True
-    from validation.scenes.registry import FOG_SCENES
-
-    names = several(scenes) or list(FOG_SCENES)
-    studied = call(names, pixels, texels, method, parameters, progress)
-    shared = tuple(each for each in largest.parameters if each[0] != "map")
-    return _map_result(studied, pixels, texels, replace(largest, parameters=shared).label)
-
-
-def _map_study(
-    names: list[Any],
-    pixels: Any,
-    texels: list[int],
-    method: Any,
-    parameters: dict[str, Any],
-    progress: Progress,
-) -> list[tuple[str, Any]]:
-    """Return of every scene its name and the errors by size."""
-    from realtime.scene.read_scene import read_scene
-    from reports.api.scenes import opened
-    from validation.estimates.quadrature import reference_image
-    from validation.study.configuration import configuration, prepared
-    from validation.study.cost import check_work, frame_work, reference_work
-    from validation.study.reference import of_image
-    from validation.study.run import run
-    from validation.study.study import Cell, Measure
-
-    loaded = [opened(name, pixels) for name in names]
-    works = [reference_work(pixels, lights=len(each.scene.emitters())) for each in loaded]
-    works += [frame_work(pixels, frames=len(texels)) for _ in loaded]
-    check_work(f"map-size, {pixels[0]} x {pixels[1]}", works)
-    by_size = [configuration(method, None, parameters | {"map": size}) for size in texels]
+    named = usual.configurations[0].method if method is None else method
+    checked = [checked_configuration(named, None, parameters | {"map": side}) for side in texels]
+    by_size, apart = [chosen for chosen, _ in checked], checked[-1][1]
+    loaded = loaded_scenes(several(scenes) or usual.scenes, size)
+    check_study("map-size", loaded, by_size, frames=1)
     for each in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
         prepared(read_scene(each.scene), by_size[-1])
-    studied = []
-    with telling(progress, "map-size") as tell:
-        for at, each in enumerate(loaded):
-            part = counted(part_of(tell, at / len(loaded), (at + 1) / len(loaded), before=f"{each.name}, "))
-            scene, reference = read_scene(each.scene), of_image(reference_image(each.scene))
-            errors = []
-            for number, chosen in enumerate(by_size):
-                part(number, len(by_size), chosen.label)
-                cell = Cell(each.name, pixels, (), chosen, Measure("none", every_metric=False))
-                row, _ = run(cell, scene, reference)
-                if row.error is None:
-                    raise InputError(f"{each.name}, {chosen.label}: {row.reason}")
-                errors.append(row.error)
-            studied.append((each.name, errors))
-    return studied
-
-
-def _map_result(studied: list[tuple[str, Any]], pixels: Any, texels: list[int], label: str) -> Study:
-    from validation.metrics.errors import plain
-    from validation.study.maps import fitted_slope
-
+    label = replace(by_size[0], parameters=tuple(each for each in by_size[0].parameters if each[0] != "map")).label
     tables, said, rows, data, drawn = [], [], [], [], []
-    for name, errors in studied:
-        title = f"{name}, {pixels[0]} x {pixels[1]}, {label}"
-        of_scene = [{"map": size, **vars(metrics)} for size, metrics in zip(texels, errors, strict=True)]
-        rows += [{"scene": name, "label": label, **row} for row in of_scene]
-        tables.append(table(f"{title}: error", (*numbers("map"), *_SHARES), of_scene))
-        order = fitted_slope(texels, [row["relative_rmse"] for row in of_scene])
-        power = f"falls as size^-({order[0]:.2f} +- {order[1]:.1g})"
-        said.append(f"{name}: the relative RMSE {power if math.isfinite(order[0]) else 'has too few values above 0'}.")
-        data.append({"name": name, "method": label, "errors": plain(of_scene), "order": plain(order)})
-        drawn.append((name, [row["relative_rmse"] for row in of_scene], *order))
+    for scene, tell in scene_by_scene(loaded, "map-size", progress):
+        cell = cells_of(scene, usual.measure, apart=apart)[1]
+        errors: list[dict[str, Any]] = []
+        for number, chosen in enumerate(by_size):
+            tell(number / len(by_size), chosen.label)
+            row = cell(chosen)[0]
+            if row.error is None:
+                raise InputError(f"{scene.name}, {chosen.label}: {row.reason}")
+            errors.append({"map": texels[number], **vars(row.error)})
+        rows += [{"scene": scene.name, "label": label, **each} for each in errors]
+        title = "{}, {} x {}, {}: error".format(scene.name, *scene.size, label)
+        tables.append(table(title, (*numbers("map"), *_SHARES), errors))
+        exponent, scatter = fitted_exponent(texels, [each["relative_rmse"] for each in errors])
+        power = f"falls as size^-({-exponent:.2f} +- {scatter:.1g})"
+        said.append(f"{scene.name}: the relative RMSE {power if math.isfinite(exponent) else _FEW}.")
+        order = -exponent, scatter
+        data.append({"name": scene.name, "method": label, "errors": plain(errors), "order": plain(order)})
+        drawn.append((scene.name, [each["relative_rmse"] for each in errors], *order))
     return Study(
         name="map-size",
-        data=with_environment(size=list(pixels), maps=texels, scenes=data),
+        data=with_environment(size=list(loaded[0].size), maps=texels, scenes=data),
         drawn=tuple(tables),
         said=tuple(said),
         rows=tuple(rows),

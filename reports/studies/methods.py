@@ -2,11 +2,12 @@
 """Studies of methods: times and errors, and errors by cause."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, fields
 from functools import cache, partial
 from typing import Any
 
+from analytic.errors import InputError
 from reports.api.inputs import (
     Kernels,
     Methods,
@@ -24,12 +25,63 @@ from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import Row, Table, Value, numbers, table, words
 
 
-def _scenes(scenes: Any, size: Any) -> list[Any]:
+def loaded_scenes(scenes: Any, size: Any) -> list[Any]:
     """Return the scenes, loaded; those for fog by default. What cannot be used is refused before the work."""
     from reports.api.scenes import opened
     from validation.scenes.registry import FOG_SCENES
 
     return [opened(each, size) for each in several(scenes) or FOG_SCENES]
+
+
+def scene_by_scene(loaded: list[Any], title: str, progress: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield each scene, and what tells how much of it is done."""
+    with telling(progress, title) as tell:
+        for at, scene in enumerate(loaded):
+            part = part_of(tell, at / len(loaded), (at + 1) / len(loaded), before=f"{scene.name}: ")
+            part(0.0, "the reference")
+            yield scene, part
+
+
+def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Callable[[Any], tuple[Any, Any]]]:
+    """Return the reference of a scene, and what gives row and frame of a configuration, compared with it.
+
+    Methods of users run in processes of their own if they can be found there, `apart`.
+    """
+    from realtime.scene.read_scene import read_scene
+    from reports.machine.own_process import in_own_process
+    from validation.estimates.quadrature import reference_image
+    from validation.study.reference import of_image
+    from validation.study.run import run
+    from validation.study.study import Cell
+
+    scene, reference = read_scene(loaded.scene), of_image(reference_image(loaded.scene))
+    path, elsewhere = str(loaded.path or loaded.name), in_own_process if apart else None
+    return reference, lambda each: run(Cell(path, loaded.size, (), each, measure), scene, reference, apart=elsewhere)
+
+
+def check_study(
+    what: str, loaded: list[Any], chosen: list[Any], *, frames: float | None = None, progress: Any = None
+) -> None:
+    """Refuse what would take more than an hour; `frames` are those of a configuration, as many as timing takes."""
+    from realtime.scene.read_scene import read_scene
+    from validation.study.configuration import configuration_work
+    from validation.study.cost import TIMED, check_work, reference_work
+
+    works = []
+    for each in loaded:
+        scene = read_scene(each.scene)
+        note(progress, scene.features.notes)
+        works.append(reference_work(each.size, lights=len(scene.lights) + len(scene.area_lights)))
+        works += [configuration_work(scene, one, frames or TIMED) for one in chosen]
+    check_work(what, works)
+
+
+def _useful(loaded: Any, chosen: list[Any]) -> tuple[Any, ...]:
+    """Return the configurations that differ in a scene from the ones before them."""
+    from realtime.scene.read_scene import read_scene
+    from validation.study.scene import configurations_for
+
+    return configurations_for(read_scene(loaded.scene).features, chosen)
 
 
 class MethodsStudy(Study):
@@ -111,20 +163,26 @@ def methods(
     activate()
     from reports.api.render import asked_configurations
     from reports.report.claims import own_faults
+    from reports.report.scene import row_record
     from reports.tables.methods import methods_table
+    from validation.metrics.errors import plain
+    from validation.study.study import Measure
 
     chosen, apart = asked_configurations(method, kernel, settings)
-    loaded = _scenes(scenes, size)
-    _check_work("methods", loaded, chosen, progress=progress)
+    loaded = loaded_scenes(scenes, size)
+    check_study("methods", loaded, chosen, progress=progress)
     benched, tables, wrong, rows = [], [], [], []
-    with telling(progress, "methods") as tell:
-        for at, scene in enumerate(loaded):
-            step = part_of(tell, at / len(loaded), (at + 1) / len(loaded))
-            records, of_scene = _methods_in(scene, chosen, seconds=seconds, apart=apart, progress=step)
-            benched.append({"name": scene.name, "size": [*scene.size], "methods": [asdict(each) for each in records]})
-            tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), records))
-            wrong += own_faults(records)
-            rows += of_scene
+    for scene, tell in scene_by_scene(loaded, "methods", progress):
+        cell = cells_of(scene, Measure("stages", seconds, every_metric=False), apart=apart)[1]
+        useful, records = _useful(scene, chosen), []
+        for at, each in enumerate(useful):
+            tell(at / len(useful), each.label)
+            row = cell(each)[0]
+            records.append(row_record(plain(row), {}))
+            rows.append({**_flat(row, each), "scene": scene.name})
+        benched.append({"name": scene.name, "size": [*scene.size], "methods": [asdict(each) for each in records]})
+        tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), records))
+        wrong += own_faults(records)
     return MethodsStudy(
         name="methods",
         data=with_environment(scenes=benched),
@@ -132,54 +190,6 @@ def methods(
         rows=tuple(rows),
         wrong=tuple(dict.fromkeys(wrong)),
     )
-
-
-def _check_work(what: str, loaded: list[Any], chosen: list[Any], *, progress: Any) -> None:
-    from realtime.scene.read_scene import read_scene
-    from validation.study.configuration import configuration_work
-    from validation.study.cost import check_work, reference_work
-
-    works = []
-    for each in loaded:
-        scene = read_scene(each.scene)
-        note(progress, scene.features.notes)
-        at = scene.camera.width, scene.camera.height
-        works.append(reference_work(at, lights=len(scene.lights) + len(scene.area_lights)))
-        works += [configuration_work(scene, one) for one in chosen]
-    check_work(what, works)
-
-
-def _methods_in(
-    loaded: Any,
-    chosen: list[Any],
-    *,
-    seconds: float,
-    apart: bool,
-    progress: Any,
-) -> tuple[list[Any], list[dict[str, Any]]]:
-    """Return what was measured in a scene, as the records of a report, and as flat rows."""
-    from realtime.scene.read_scene import read_scene
-    from reports.machine.own_process import in_own_process
-    from reports.report.scene import row_record
-    from validation.estimates.quadrature import reference_image
-    from validation.metrics.errors import plain
-    from validation.study.reference import of_image
-    from validation.study.run import run
-    from validation.study.scene import configurations_for
-    from validation.study.study import Cell, Measure
-
-    progress(0.0, f"{loaded.name}: the reference")
-    scene, reference = read_scene(loaded.scene), of_image(reference_image(loaded.scene))
-    size, path = (scene.camera.width, scene.camera.height), str(loaded.path or loaded.name)
-    wanted = Measure("stages", seconds, every_metric=False)
-    records, rows = [], []
-    useful = configurations_for(scene.features, chosen)
-    for at, each in enumerate(useful):
-        progress(at / len(useful), f"{loaded.name}: {each.label}")
-        row, _ = run(Cell(path, size, (), each, wanted), scene, reference, apart=in_own_process if apart else None)
-        records.append(row_record(plain(row), {}))
-        rows.append({**_flat(row, each), "scene": loaded.name})
-    return records, rows
 
 
 def _flat(row: Any, chosen: Any) -> dict[str, Any]:
@@ -205,21 +215,15 @@ _BY_CAUSE = (
     *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", how=FRACTION),
     *numbers(share="fraction of the whole", how={"percent": True, "places": 1}),
 )
-#: What is split by default: the methods and their parameters.
-_SPLIT: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("ray-march", {"steps": 16, "shadow": "map"}),
-    ("min-max", {}),
-    ("froxel-fog", {}),
-)
 
 
 @one_error
 def decomposition(
-    scenes: Scenes = ("colonnade",),
+    scenes: Scenes = (),
     *,
     method: Methods = (),
     settings: Values = (),
-    size: Size | None = (240, 180),
+    size: Size = (240, 180),
     progress: Progress = None,
 ) -> Study:
     """Split the error of methods by its causes.
@@ -230,7 +234,7 @@ def decomposition(
     Parameters
     ----------
     scenes
-        Built-in scenes, random:SEED and Mitsuba XML files.
+        Built-in scenes, random:SEED and Mitsuba XML files; colonnade by default.
     method
         A method, as in `airlight study methods`; by default a ray march by a map, min-max and froxel-fog.
     settings
@@ -244,27 +248,25 @@ def decomposition(
 
     activate()
     from reports.api.render import asked_configurations
-    from validation.study.configuration import configuration
+    from validation.study.study import standard_study
 
-    usual = [configuration(name, parameters=values) for name, values in _SPLIT]
-    chosen, apart = asked_configurations(method, (), settings, usual=usual)
-    loaded = _scenes(scenes, size)
-    _check_work("decomposition", loaded, chosen, progress=progress)
+    usual = standard_study("decomposition")
+    chosen, apart = asked_configurations(method, (), settings, usual=usual.configurations)
+    loaded = loaded_scenes(several(scenes) or list(usual.scenes), size)
+    check_study("decomposition", loaded, chosen, progress=progress)
     data, tables, rows, drawn = [], [], [], []
-    with telling(progress, "decomposition") as tell:
-        for at, scene in enumerate(loaded):
-            step = part_of(tell, at / len(loaded), (at + 1) / len(loaded))
-            entries, split = _split(scene, chosen, apart=apart, progress=step)
-            width, height = scene.size
-            data.append({"name": scene.name, "size": [width, height], "methods": entries})
-            tables.append(_cause_table(f"{scene.name}, {width} x {height}: error of the airlight by cause", entries))
-            rows += [
-                {"scene": scene.name, "label": entry["label"], **part}
-                for entry in entries
-                if not entry["refused"]
-                for part in (entry["whole"], *entry["parts"])
-            ]
-            drawn.append(split)
+    for scene, tell in scene_by_scene(loaded, "decomposition", progress):
+        entries, split = _split(scene, chosen, usual.measure, apart=apart, progress=tell)
+        data.append({"name": scene.name, "size": list(scene.size), "methods": entries})
+        title = "{}, {} x {}: error of the airlight by cause".format(scene.name, *scene.size)
+        tables.append(_cause_table(title, entries))
+        rows += [
+            {"scene": scene.name, "label": entry["label"], **part}
+            for entry in entries
+            if not entry["refused"]
+            for part in (entry["whole"], *entry["parts"])
+        ]
+        drawn.append(split)
     return Study(
         name="decomposition",
         data=with_environment(scenes=data),
@@ -274,41 +276,35 @@ def decomposition(
     )
 
 
-def _split(loaded: Any, chosen: list[Any], *, apart: bool, progress: Any) -> tuple[list[dict[str, Any]], Any]:
+def _split(
+    loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progress: Any
+) -> tuple[list[dict[str, Any]], Any]:
     """Return the errors of a scene by cause, JSON-ready and with their images."""
-    from realtime.errors import InputError as MethodError
     from realtime.scene.read_scene import read_scene
-    from reports.machine.own_process import in_own_process
-    from validation.estimates.quadrature import reference_image
     from validation.metrics.errors import plain
-    from validation.study.decompose import decompose, exact_sum
-    from validation.study.run import frame_of
-    from validation.study.scene import configurations_for
-    from validation.study.study import Cell
+    from validation.study.causes import decompose
 
-    scene = read_scene(loaded.scene)
-    progress(0.0, f"{loaded.name}: the reference")
-    reference = reference_image(loaded.scene).airlight
-    exact = cache(partial(exact_sum, scene))
+    reference, cell = cells_of(loaded, measure, apart=apart)
+
+    @cache
+    def airlight(configuration: Any) -> Any:
+        row, frame = cell(configuration)
+        if frame is None or row.error is None or row.error.nonfinite:
+            raise InputError(row.reason or f"{configuration.label}: its image has values that are not finite")
+        return frame.airlight
+
     entries, split = [], []
-    useful = configurations_for(scene.features, chosen)
+    useful = _useful(loaded, chosen)
     for at, each in enumerate(useful):
-        progress((1 + at) / (1 + len(useful)), f"{loaded.name}: {each.label}")
-
-        def own(configuration: Any, each: Any = each) -> Any:
-            cell = Cell(str(loaded.path or loaded.name), loaded.size, (), configuration)
-            if not apart:
-                return frame_of(cell).airlight
-            return in_own_process(frame_of, cell, name=each.method).airlight
-
+        progress((1 + at) / (1 + len(useful)), each.label)
         entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
         entry |= {"parameters": dict(each.parameters)}
         try:
-            found = decompose(scene, each, reference, render=own, exact=exact)
-        except MethodError as error:
+            found = decompose(read_scene(loaded.scene), each, reference.airlight, airlight)
+        except InputError as error:
             entries.append(entry | {"refused": str(error)})
             continue
-        split.append((each.label, reference, found))
+        split.append((each.label, reference.airlight, found))
         parts = [plain(numbers) for numbers, _ in found]
         entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
     return entries, split

@@ -50,9 +50,10 @@ def motion(
     activate()
     from reports.api.render import asked_configurations
     from reports.api.scenes import opened
-    from validation.study.motion import USUAL, method_motion
+    from validation.study.configuration import named_configurations
+    from validation.study.motion import method_motion
 
-    chosen, _ = asked_configurations(method, kernel, settings, usual=USUAL)
+    chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("motion"))
     loaded = opened(scene, pixels_of(size))
     with telling(progress, "motion") as tell:
         rows = method_motion(

@@ -54,9 +54,10 @@ def noise(
     from reports.api.scenes import opened
     from validation.metrics.errors import plain
     from validation.motion.noise import BLURS, time_words
-    from validation.study.noise import USUAL, method_noise
+    from validation.study.configuration import named_configurations
+    from validation.study.noise import method_noise
 
-    chosen, _ = asked_configurations(method, kernel, settings, usual=USUAL)
+    chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("noise"))
     loaded = opened(scene, pixels_of(size))
     with telling(progress, "noise") as tell:
         found = method_noise(loaded.scene, chosen, runs=runs, progress=counted(tell))

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A study of estimators of the transmittance of rays through a density grid."""
 
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -42,7 +41,7 @@ def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> S
 
     with telling(progress, "rays") as tell:
         read = read_reference(opened(scene, (8, 6)).scene)
-        rows = [asdict(each) for each in transmittance_errors(read, _STEPS, progress=tell)]
+        rows = transmittance_errors(read, _STEPS, progress=tell)
     columns = (
         *words("estimator"),
         *numbers("steps", look_ups="look-ups"),

@@ -22,15 +22,9 @@ FILES = {
 def certified_data(name: str = "certified_fog.json") -> Path:
     """Return the path of a file of certified values.
 
-    Parameters
-    ----------
-    name
-        One of `FILES`; the scenes of fog by default.
+    `name`: one of `FILES`; the scenes of fog by default.
 
-    Raises
-    ------
-    InputError
-        For another name.
+    Raises InputError for another name.
 
     Examples
     --------

@@ -136,12 +136,8 @@ def diagnose_file(
 ) -> tuple[Diagnosis, ...]:
     """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both; see `diagnose_image`.
 
-    Parameters
-    ----------
-    path, scene
-        The EXR file; a built-in scene or a Mitsuba XML file.
-    layer, holds
-        Which layer, see `validation.engine.judged_layer.judged_layer`.
+    `path`, `scene`: the EXR file; a built-in scene or a Mitsuba XML file; `layer`, `holds`: which layer, see
+    `validation.engine.judged_layer.judged_layer`.
     """
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
@@ -163,18 +159,10 @@ def diagnose_image(
 ) -> Diagnosis:
     """Say what is wrong with an image of a scene.
 
-    Parameters
-    ----------
-    image, loaded
-        The layers, and the scene at their size.
-    layer, holds
-        Which layer, and what it holds: 'airlight', 'surface' or 'total'.
-    judged
-        The layer itself, if it is known.
-    pixel
-        'centre' or 'area'; by default what the image says of itself, or what fits better.
-    light
-        Of this scene, as other images of it have found it.
+    `image`, `loaded`: the layers, and the scene at their size; `layer`, `holds`: which layer, and what it holds:
+    'airlight', 'surface' or 'total'; `judged`: the layer itself, if it is known; `pixel`: 'centre' or 'area'; by
+    default what the image says of itself, or what fits better; `light`: of this scene, as other images of it have found
+    it.
     """
     judged = judged or judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene)

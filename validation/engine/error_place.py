@@ -65,12 +65,8 @@ class ErrorPlace:
 def error_place(reference: Array, image: Array, light_pixels: Array) -> ErrorPlace | None:
     """Return where most of the squared error lies; None where there is no error.
 
-    Parameters
-    ----------
-    reference, image
-        Radiance, (height, width, 3) [W/(m^2 sr)].
-    light_pixels
-        How far a light is, (height, width) [pixels].
+    `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `light_pixels`: how far a light is, (height, width)
+    [pixels].
     """
     difference = np.where(np.isfinite(reference) & np.isfinite(image), image - reference, 0.0)
     squared = (difference**2).sum(axis=2)

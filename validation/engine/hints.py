@@ -50,13 +50,8 @@ class Hints:
 def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
     """Look for faults of an image as a whole.
 
-    Parameters
-    ----------
-    reference, test
-        Radiance, (height, width, 3) [W/(m^2 sr)].
+    `reference`, `test`: radiance, (height, width, 3) [W/(m^2 sr)].
 
-    Notes
-    -----
     Values that are not finite in either are left out.
     """
     ref, tst = (np.asarray(values, dtype=np.float64) for values in (reference, test))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from reference.storage.exr import Image, read_exr
+from reference.storage.exr import read_exr
 from validation.clock import Timing
 from validation.engine.judge import EngineComparison, ReferenceOf, judge_image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, judged_layer
@@ -37,41 +37,11 @@ class EngineImage:
     path: Path
 
 
-@dataclass(frozen=True)
-class ImageMeasurement:
-    """How wrong an image from elsewhere is."""
-
-    shown: EngineImage
-    image: Image  #: only the layers that were judged, named by what they hold
-    judged: EngineComparison
-    surface_error: Metrics | None  #: where the image has both layers
-    times: tuple[Timing, str] | None = None  #: that its engine took for a frame, and on what, as `times.json` says
-
-    @property
-    def light(self) -> NDArray[np.float64]:
-        """All light in the image, to look at (height, width, 3) [W/(m^2 sr)]."""
-        return np.sum([np.asarray(values, dtype=np.float64) for values in self.image.layers.values()], axis=0)
-
-    @property
-    def notes(self) -> str:
-        """What the reader of the file changed or left out, what a pixel is, whether it is right, and the device."""
-        judged = self.judged
-        notes = [judged.note] if judged.note else []
-        notes += ["judged by the means over the areas of pixels, which fit"] if judged.pixel == "area" else []
-        notes += [judged.verdict.words]
-        notes += [f"timed on {self.times[1]}"] if self.times is not None and self.times[1] else []
-        return "; ".join(notes)
-
-
 def find_images(folder: str | os.PathLike[str], scenes: Mapping[str, str]) -> dict[str, tuple[EngineImage, ...]]:
     """Return the images in a folder by the name of their scene.
 
-    Parameters
-    ----------
-    folder
-        Holds EXR files; other files are not looked at.
-    scenes
-        The scenes that files may name: a name, and what `validation.scenes.loading.load_scene` takes for it.
+    `folder`: holds EXR files; other files are not looked at; `scenes`: the scenes that files may name: a name, and what
+    `validation.scenes.loading.load_scene` takes for it.
     """
     place = Path(folder)
     if not place.is_dir():
@@ -102,15 +72,12 @@ def images_size(images: tuple[EngineImage, ...]) -> tuple[int, int]:
 
 def measure_image(
     shown: EngineImage, loaded: LoadedScene, reference_of: ReferenceOf, *, surfaces: bool
-) -> ImageMeasurement:
+) -> tuple[EngineComparison, Mapping[str, NDArray[np.floating]], Metrics | None]:
     """Judge an image from elsewhere by the reference of its scene at its size, as `airlight compare SCENE IMAGE` does.
 
-    Parameters
-    ----------
-    loaded, reference_of
-        The scene at that size, and what computes its reference for 'centre' or 'area'.
-    surfaces
-        Whether the scene has surfaces at all.
+    `loaded`, `reference_of`: the scene at that size, and what computes its reference for 'centre' or 'area';
+    `surfaces`: whether the scene has surfaces at all. Return the judgement, the layers that were judged by what they
+    hold, and the error of the surface where an image has both layers.
     """
     image = read_exr(shown.path)
     layer = judged_layer(image, shown.path)
@@ -119,8 +86,15 @@ def measure_image(
         layers[SURFACE] = image.layers[SURFACE]
     judged = judge_image(image, layer, loaded, reference_of, path=shown.path, mask=image.with_data())
     both = surfaces and AIRLIGHT in layers and SURFACE in layers
-    surface = error_metrics(judged.fit.truth.surface, layers[SURFACE]) if both else None
-    return ImageMeasurement(shown, Image(layers), judged, surface, image_times(shown.path))
+    return judged, layers, error_metrics(judged.fit.truth.surface, layers[SURFACE]) if both else None
+
+
+def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:
+    """Return what the reader of a file changed or left out, what a pixel is, whether it is right, and the device."""
+    notes = [judged.note] if judged.note else []
+    notes += ["judged by the means over the areas of pixels, which fit"] if judged.pixel == "area" else []
+    notes += [judged.verdict.words]
+    return "; ".join([*notes, f"timed on {times[1]}"] if times is not None and times[1] else notes)
 
 
 def image_times(path: Path) -> tuple[Timing, str] | None:

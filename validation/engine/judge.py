@@ -204,21 +204,11 @@ def compare_scene(
 ) -> EngineComparison:
     """Compare an EXR file with the truth of a scene at the file's size.
 
-    Parameters
-    ----------
-    scene
-        A built-in scene or a Mitsuba XML file.
-    layer, holds
-        The layer to judge and what it holds, see `validation.engine.judged_layer.judged_layer`.
-    pixel
-        'centre' or 'area', see `reference.quadrature.image.quadrature_image`; by default what the image says of itself,
-        or what fits.
-    mask
-        An EXR file that is 0 in pixels to leave out.
-    all_metrics
-        See `validation.comparison.images.compare_images`.
-    margin
-        Largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
+    `scene`: a built-in scene or a Mitsuba XML file; `layer`, `holds`: the layer to judge and what it holds, see
+    `validation.engine.judged_layer.judged_layer`; `pixel`: 'centre' or 'area', see
+    `reference.quadrature.image.quadrature_image`; by default what the image says of itself, or what fits; `mask`: an
+    EXR file that is 0 in pixels to leave out; `all_metrics`: see `validation.comparison.images.compare_images`;
+    `margin`: largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.
     """
     image = read_exr(path)
     judged = judged_layer(image, path, name=layer, holds=holds)
@@ -251,16 +241,9 @@ def judge_image(
 ) -> EngineComparison:
     """Judge a layer of an image by the reference of its scene, as `compare_scene` and the report do.
 
-    Parameters
-    ----------
-    image, judged
-        The image, and the layer of it.
-    loaded, reference_of
-        The scene at its size, and what computes its reference for 'centre' or 'area'.
-    mask
-        Which pixels are compared, (height, width); all by default.
-    metrics
-        More for `validation.comparison.images.compare_images`.
+    `image`, `judged`: the image, and the layer of it; `loaded`, `reference_of`: the scene at its size, and what
+    computes its reference for 'centre' or 'area'; `mask`: which pixels are compared, (height, width); all by default;
+    `metrics`: more for `validation.comparison.images.compare_images`.
     """
     if margin is not None and not 0 < margin < math.inf:
         raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
@@ -357,12 +340,8 @@ def _mean_square(values: NDArray[np.floating]) -> float:
 def fit_pixel(image: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]) -> PixelFit:
     """Return the truth that fits an image.
 
-    Parameters
-    ----------
-    reference_of
-        Computes a truth; asked for the means only if the image does not fit the centres to `_EXACT`.
-    kinds
-        What its pixels may be, see `validation.engine.seen.pixel_kinds`.
+    `reference_of`: computes a truth; asked for the means only if the image does not fit the centres to `_EXACT`;
+    `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
     """
     if len(kinds) == 1:
         truth = reference_of(kinds[0])
@@ -405,14 +384,8 @@ def _error(truth: Array, image: Array, where: NDArray[np.bool_]) -> float:
 def judge(truth: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:
     """Decide whether an image is right.
 
-    Parameters
-    ----------
-    truth, image
-        Radiance, (height, width, 3) [W/(m^2 sr)].
-    hints
-        What is suspected of the image as a whole.
-    failures
-        Why it must be called wrong anyway: values that are not finite, or negative.
+    `truth`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `hints`: what is suspected of the image as a whole;
+    `failures`: why it must be called wrong anyway: values that are not finite, or negative.
     """
     side = min(BLOCK, max(1, min(truth.shape[:2]) // 10))
     error, noise = _block_errors(truth, image, side)

@@ -40,13 +40,9 @@ def judged_layer(
 ) -> JudgedLayer:
     """Return the layer to judge.
 
-    Parameters
-    ----------
-    name
-        The layer: by default 'airlight' where there is one, else the plain channels, else the only layer, else the only
-        one that Blender calls Combined.
-    holds
-        What it holds, one of `KINDS`: by default what its name says, else all light.
+    `name`: the layer: by default 'airlight' where there is one, else the plain channels, else the only layer, else the
+    only one that Blender calls Combined; `holds`: what it holds, one of `KINDS`: by default what its name says, else
+    all light.
     """
     if holds is not None and holds not in KINDS:
         raise InputError(f"holds {holds}; wanted one of {', '.join(KINDS)}")

@@ -65,14 +65,9 @@ def explain(
 ) -> Explanation:
     """Return the best explanation by some faults together.
 
-    Parameters
-    ----------
-    faults
-        In the order in which they change the guess.
-    near
-        Values to begin with; by default all starts of the faults are tried.
-    fine
-        Whether the values are looked for to all digits, or to some per cent, which a fault that is wrong needs.
+    `faults`: in the order in which they change the guess; `near`: values to begin with; by default all starts of the
+    faults are tried; `fine`: whether the values are looked for to all digits, or to some per cent, which a fault that
+    is wrong needs.
     """
     # Of what moves paths, which are found again for each value, few come first; to tell faults apart they are enough.
     moves = any(parameter.step for fault in faults for parameter in fault.parameters)

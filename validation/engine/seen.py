@@ -55,14 +55,8 @@ class Seen:
     ) -> View:
         """Return the rays of the pixels that take part: one at random of each of as many equal parts of the image.
 
-        Parameters
-        ----------
-        most
-            How many rays are enough.
-        apart
-            Where not all pixels take part, they are chosen as pairs so far apart in a row; 0: each by itself [pixels].
-        offset, zoom
-            See `validation.fog_model.view.view_of`.
+        `most`: how many rays are enough; `apart`: where not all pixels take part, they are chosen as pairs so far apart
+        in a row; 0: each by itself [pixels]; `offset`, `zoom`: see `validation.fog_model.view.view_of`.
         """
         pixels, count = np.flatnonzero(self.used), self.pixels_of_rays(most)
         if len(pixels) > count:

@@ -55,10 +55,7 @@ Target = Literal["pooled", "worst"]
 class Budget:
     """When to stop: exactly one of the three is given.
 
-    Raises
-    ------
-    InputError
-        If none or more than one is given, or one is no positive number.
+    Raises InputError if none or more than one is given, or one is no positive number.
     """
 
     samples: int | None = None  #: a pixel, at least

@@ -20,7 +20,7 @@ every step, which gives the unbiased estimate X = (l/n) sum sigma_t of tau.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,19 +35,6 @@ Look = Callable[[Array], Array]  # shares of a ray, any shape -> optical depth o
 
 _ORDER_0, _SURE, _RATE = 0.9, 2, 2.0  # of the roulette
 _RAYS, _TIMES = 48, 1024
-
-
-@dataclass(frozen=True)
-class TransmittanceError:
-    """How wrong an estimator is, over rays and relative to their mean transmittance."""
-
-    estimator: str
-    steps: int  #: of a march, or how many times the majorant's optical depth
-    look_ups: float  #: a ray, on the average
-    bias: float
-    bias_error: float  #: its standard error
-    spread: float  #: root of the mean variance of one estimate
-    jensen: float | None  #: the brightening that follows from the variance of a march, to second order
 
 
 def marches(look: Look, random: np.random.Generator, times: int, steps: int) -> Array:
@@ -107,13 +94,16 @@ def transmittance_errors(
     steps: Sequence[int],
     *,
     progress: Callable[[float, str], None] | None = None,
-) -> list[TransmittanceError]:
-    """Return how wrong the estimators are along rays through the grid of a scene.
+) -> list[dict[str, Any]]:
+    """Return how wrong the estimators are along rays through the grid of a scene, a row for each and its steps.
 
     `steps`: of the marches; `progress`: called with (fraction done, what).
 
-    Rays go between random places in the box; each has 1024 estimates by each estimator. Raises InputError for a scene
-    without a grid.
+    Rays go between random places in the box; each has 1024 estimates by each `estimator`. A row has `steps` of a march,
+    or how many times the majorant's optical depth; `look_ups` a ray, on the average; and, relative to the mean
+    transmittance of the rays, `bias` with its standard error `bias_error`, `spread`, the root of the mean variance of
+    one estimate, and `jensen`, the brightening that follows from the variance of a march, to second order, None for
+    others. Raises InputError for a scene without a grid.
     """
     medium = truth.medium
     if not isinstance(medium, GridMedium):
@@ -153,15 +143,15 @@ def transmittance_errors(
     return [_over_rays(name, count, np.array(rays), exact) for (name, count), rays in sorted(found.items())]
 
 
-def _over_rays(name: str, count: int, rays: Array, exact: Array) -> TransmittanceError:
+def _over_rays(name: str, count: int, rays: Array, exact: Array) -> dict[str, Any]:
     look_ups, mean, variance, depth_variance = rays.T
     scale = exact.mean()
-    return TransmittanceError(
-        name,
-        count,
-        float(look_ups.mean()),
-        float((mean - exact).mean() / scale),
-        float(np.sqrt(variance.sum() / _TIMES) / _RAYS / scale),
-        float(np.sqrt(variance.mean()) / scale),
-        float((0.5 * exact * depth_variance).mean() / scale) if name == "naive" else None,
-    )
+    return {
+        "estimator": name,
+        "steps": count,
+        "look_ups": float(look_ups.mean()),
+        "bias": float((mean - exact).mean() / scale),
+        "bias_error": float(np.sqrt(variance.sum() / _TIMES) / _RAYS / scale),
+        "spread": float(np.sqrt(variance.mean()) / scale),
+        "jensen": float((0.5 * exact * depth_variance).mean() / scale) if name == "naive" else None,
+    }

@@ -36,10 +36,7 @@ class Group:
 def confounded_groups(derivatives: Array) -> tuple[Group, ...]:
     """Return the groups of parameters that are not told apart.
 
-    Parameters
-    ----------
-    derivatives
-        Weighted derivatives of all values by all parameters, (n, parameters).
+    `derivatives`: weighted derivatives of all values by all parameters, (n, parameters).
     """
     length = np.linalg.norm(derivatives, axis=0)
     count = len(length)

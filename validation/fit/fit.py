@@ -138,21 +138,12 @@ def fit_image(
 ) -> Fit:
     """Find the parameters that explain an image.
 
-    Parameters
-    ----------
-    loaded
-        The scene, at the size of the image: geometry, camera and lights are taken from it, and what is not looked for.
-    parameters, starts
-        What is looked for, see `validation.fit.unknowns`, and values to begin with; the scene's own by default.
-    layer, holds
-        Which layer, and what it holds, see `validation.engine.judged_layer.judged_layer`.
-    pixel
-        'centre' or 'area'; by default what the image says of itself, or what fits better.
-    mask
-        Which pixels may take part, (height, width); all by default.
+    `loaded`: the scene, at the size of the image: geometry, camera and lights are taken from it, and what is not looked
+    for; `parameters`, `starts`: what is looked for, see `validation.fit.unknowns`, and values to begin with; the
+    scene's own by default; `layer`, `holds`: which layer, and what it holds, see
+    `validation.engine.judged_layer.judged_layer`; `pixel`: 'centre' or 'area'; by default what the image says of
+    itself, or what fits better; `mask`: which pixels may take part, (height, width); all by default.
 
-    Notes
-    -----
     Valid for single scattering: homogeneous media and height fog, point and spot lights, directional ones where media
     have bounds or density falls with height; area lights are 16 to 128 samples here, which leaves some 0.5 % in a
     pixel. The intervals count pixels as independent of one another.

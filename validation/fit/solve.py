@@ -264,10 +264,7 @@ def _sandwich(derivatives: Array, residual: Array, weights: Array, kept: Bools) 
 def noise_of(radiance: Array, residual: Array) -> Array:
     """Return the standard deviation of each value.
 
-    Parameters
-    ----------
-    radiance, residual
-        Of the model, and image minus model, (n,) each [W/(m^2 sr)].
+    `radiance`, `residual`: of the model, and image minus model, (n,) each [W/(m^2 sr)].
     """
     usual = float(np.mean(np.abs(radiance + residual)))  # of the image
     least = _ROUNDING * (np.abs(radiance) + 1e-3 * usual) + 1e-140

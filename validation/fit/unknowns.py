@@ -109,12 +109,8 @@ def read_unknowns(
 ) -> tuple[Unknown, ...]:
     """Return the parameters that names stand for.
 
-    Parameters
-    ----------
-    truth, fog
-        The scene, and what it says of the fog.
-    starts
-        Values to begin with, by name; the scene's own by default.
+    `truth`, `fog`: the scene, and what it says of the fog; `starts`: values to begin with, by name; the scene's own by
+    default.
     """
     if not names:
         raise InputError(f"fit: got none, wanted some of {', '.join(NAMES)}")

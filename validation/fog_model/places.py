@@ -95,12 +95,8 @@ def point_nodes(
 ) -> Places:
     """Return the nodes of a point or spot light, or of a sample of an area light.
 
-    Parameters
-    ----------
-    reach
-        Which parts of the rays it reaches.
-    ends
-        Distances between which rays have nodes, (rays,) each [m]; all by default.
+    `reach`: which parts of the rays it reaches; `ends`: distances between which rays have nodes, (rays,) each [m]; all
+    by default.
     """
     rays = reach.rays
     ray, x0, x1 = lit_stretches(light, rays, reach.lit)
@@ -175,14 +171,8 @@ def surface_points(
 ) -> Places:
     """Return the visible surface points that a light reaches: L = f(w_i, w_o) cos I profile / r^2.
 
-    Parameters
-    ----------
-    distance
-        Of the surfaces along the rays, (rays,) [m].
-    reflected
-        f cos, (rays, 3) [1/sr].
-    lit
-        Which of them the light reaches, (rays,).
+    `distance`: of the surfaces along the rays, (rays,) [m]; `reflected`: f cos, (rays, 3) [1/sr]; `lit`: which of them
+    the light reaches, (rays,).
     """
     ray = np.flatnonzero(lit & np.any(reflected > 0, axis=1))
     direction, x = truth.direction[ray], distance[ray]
@@ -206,14 +196,8 @@ def panel_nodes(
 ) -> tuple[Index, Array, Array]:
     """Return Gauss-Legendre nodes on intervals.
 
-    Parameters
-    ----------
-    start, width
-        Of the intervals, (n,), in any variable.
-    most, short
-        Widest panel, and the widest interval that few nodes serve.
-    orders
-        How many nodes a panel has, and how many are few.
+    `start`, `width`: of the intervals, (n,), in any variable; `most`, `short`: widest panel, and the widest interval
+    that few nodes serve; `orders`: how many nodes a panel has, and how many are few.
 
     Returns
     -------
@@ -223,13 +207,11 @@ def panel_nodes(
     few = width <= short
     owners, places, weights = [], [], []
     for chosen, order in ((np.flatnonzero(few), orders[1]), (np.flatnonzero(~few), orders[0])):
-        panels = np.maximum(np.ceil(width[chosen] / most).astype(np.int64), 1)
-        owner = np.repeat(chosen, panels)
-        number = np.arange(len(owner)) - np.repeat(np.cumsum(panels) - panels, panels)
-        size = width[owner] / np.repeat(panels, panels)
+        count = np.maximum(np.ceil(width[chosen] / most), 1)
+        owner, begin, size = equal_panels(chosen, start[chosen], width[chosen], count)
         node, weight = np.polynomial.legendre.leggauss(order)
         owners.append(np.repeat(owner, order))
-        places.append(((start[owner] + size * number)[:, None] + 0.5 * size[:, None] * (1 + node)).ravel())
+        places.append((begin[:, None] + 0.5 * size[:, None] * (1 + node)).ravel())
         weights.append((0.5 * size[:, None] * weight).ravel())
     owner = np.concatenate(owners)
     by_owner = np.argsort(owner, kind="stable")
@@ -239,12 +221,8 @@ def panel_nodes(
 def lengths(truth: ReferenceScene, origin: Array, direction: Array, reach: Array) -> Array:
     """Return how much of straight lines lies in each medium, that without bounds first, (n, media) [m].
 
-    Parameters
-    ----------
-    origin, direction
-        Of the lines, (3,) or (n, 3) [m], and (n, 3).
-    reach
-        How long they are, (n,) [m]; infinite where nothing surrounds the media, whose length is then given as 0.
+    `origin`, `direction`: of the lines, (3,) or (n, 3) [m], and (n, 3); `reach`: how long they are, (n,) [m]; infinite
+    where nothing surrounds the media, whose length is then given as 0.
     """
     inside = []
     for medium in truth.media:

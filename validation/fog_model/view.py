@@ -143,17 +143,10 @@ def view_of(
 ) -> View:
     """Return the rays of some pixels.
 
-    Parameters
-    ----------
-    pixels
-        Numbers of the pixels, row by row; all by default.
-    rays_per_side
-        0: one ray through the centre of each pixel. n: n x n rays, one through the middle of each cell of a grid,
-        whose mean is that over the pixel.
-    offset
-        Moves all rays on the film, to the right and down [pixels].
-    zoom
-        Factor on the distance of all rays from the middle of the film, before they are moved.
+    `pixels`: numbers of the pixels, row by row; all by default; `rays_per_side`: 0: one ray through the centre of each
+    pixel. n: n x n rays, one through the middle of each cell of a grid, whose mean is that over the pixel; `offset`:
+    moves all rays on the film, to the right and down [pixels]; `zoom`: factor on the distance of all rays from the
+    middle of the film, before they are moved.
     """
     size = truth.width, truth.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
@@ -214,21 +207,11 @@ def scattering_paths(
 ) -> ScatteringPaths:
     """Return all paths of a view.
 
-    Parameters
-    ----------
-    lights
-        Point and spot lights in the place of those of the scene.
-    radius
-        Of spheres that take the place of point lights, of the same intensity [m].
-    blend
-        Fraction of 1 - cos(cut-off), from the cut-off inwards, in which spots fall off smoothly, besides their own
-        edge.
-    ends
-        Distances between which rays have nodes, (rays,) each [m].
-    shadows
-        False where surfaces hide nothing from the lights.
-    samples, seed
-        How many samples stand for an area light, and their seed.
+    `lights`: point and spot lights in the place of those of the scene; `radius`: of spheres that take the place of
+    point lights, of the same intensity [m]; `blend`: fraction of 1 - cos(cut-off), from the cut-off inwards, in which
+    spots fall off smoothly, besides their own edge; `ends`: distances between which rays have nodes, (rays,) each [m];
+    `shadows`: false where surfaces hide nothing from the lights; `samples`, `seed`: how many samples stand for an area
+    light, and their seed.
     """
     truth = view.truth if lights is None else replace(view.truth, lights=tuple(lights))
     sources = light_sources(truth, samples, seed, radius)

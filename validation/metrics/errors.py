@@ -47,12 +47,8 @@ class Metrics:
 def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None) -> Metrics:
     """Compare a test image with a reference (formulae: see the module).
 
-    Parameters
-    ----------
-    reference, test
-        Radiance [W/(m^2 sr)], (height, width) or (height, width, channels).
-    mask
-        Pixels to compare, (height, width) of truth values; all by default.
+    `reference`, `test`: radiance [W/(m^2 sr)], (height, width) or (height, width, channels); `mask`: pixels to compare,
+    (height, width) of truth values; all by default.
 
     Returns
     -------
@@ -60,10 +56,7 @@ def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | No
         In float64. If no pixel is finite in both images, every error is NaN; if the reference is black, the relative
         ones are. Quantiles are linear between order statistics.
 
-    Raises
-    ------
-    InputError
-        If the sizes differ, an image is empty, or the mask does not fit or leaves nothing.
+    Raises InputError if the sizes differ, an image is empty, or the mask does not fit or leaves nothing.
     """
     ref, tst, chosen = compared(reference, test, mask)
     finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)

@@ -67,11 +67,8 @@ class FramesRecord:
 def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
     """Read `frames.json`.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, has a key that is not known or a value of another kind, or lists of other lengths than
-        there are frames.
+    Raises InputError if it cannot be read, has a key that is not known or a value of another kind, or lists of other
+    lengths than there are frames.
     """
     try:
         given = json.loads(Path(path).read_text(encoding="utf-8"))

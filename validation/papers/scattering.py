@@ -51,8 +51,8 @@ def multiple_scattering() -> dict[str, Any]:
     described["fog"]["scale"] = _THIN
     scene = mi.load_dict(described)
     resize(scene, _SIZE)
-    thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
-    return {"left over": max(map(_left_over, _SCENES)), "thin": [thin.value, *thin.interval]}
+    thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES)["medium"]
+    return {"left over": max(map(_left_over, _SCENES)), "thin": [thin["value"], *thin["interval"]]}
 
 
 def _left_over(name: str) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.scene.camera import read_camera, resized_camera
-from realtime.scene.media.light_paths import BoundedMedium
 from realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
@@ -164,14 +163,14 @@ def optical_depth(scene: Scene, start: Array, end: Array) -> Array:
     length = np.linalg.norm(way, axis=-1)
     outside, depth = length.copy(), np.zeros(length.shape)
     for bounded in scene.medium.bounded_media:
-        chord = _chord(bounded, start, way, length)
-        outside = outside - chord
-        depth += chord * _mean_extinction(bounded.medium)
+        inside = chord(_host(bounded.centre), float(bounded.radius[0]), start, way, length)
+        outside = outside - inside
+        depth += inside * _mean_extinction(bounded.medium)
     return depth + np.maximum(outside, 0) * _mean_extinction(scene.medium)
 
 
-def _chord(bounded: BoundedMedium, start: Array, way: Array, length: Array) -> Array:
-    centre, radius = np.array(bounded.centre, dtype=np.float64).ravel(), float(bounded.radius[0])
+def chord(centre: Array, radius: float, start: Array, way: Array, length: Array) -> Array:
+    """Return how much of segments lies in a ball, (...,) [m]: from `start` along `way`, (..., 3), of a length."""
     square = np.maximum(length**2, 1e-30)
     from_centre = start - centre
     middle = -np.sum(from_centre * way, axis=-1) / square

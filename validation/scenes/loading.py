@@ -48,20 +48,12 @@ def load_scene(
 ) -> LoadedScene:
     """Load a built-in scene or a Mitsuba XML file into the active variant.
 
-    Parameters
-    ----------
-    name_or_path
-        A name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a Mitsuba scene file.
-    size
-        Width and height of the image [pixels]; the scene's own by default.
-    changes
-        What is not as the scene has it, values by name, see `validation.scenes.changes`.
+    `name_or_path`: a name of `validation.scenes.registry.SCENES`, `random:SEED`, or the path of a Mitsuba scene file;
+    `size`: width and height of the image [pixels]; the scene's own by default; `changes`: what is not as the scene has
+    it, values by name, see `validation.scenes.changes`.
 
-    Raises
-    ------
-    InputError
-        For an unknown name, a missing or malformed file, a size that no image can have, and a change that the scene
-        cannot have. Whether methods and reference support the scene is checked when they read it.
+    Raises InputError for an unknown name, a missing or malformed file, a size that no image can have, and a change that
+    the scene cannot have. Whether methods and reference support the scene is checked when they read it.
     """
     register_height_fog()
     record = find_record(name_or_path)

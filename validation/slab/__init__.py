@@ -6,7 +6,6 @@ Read in this order:
 - `phases.py`: phase functions by name or from a file, for both sides;
 - `moments.py`: order after order, with the moments of the displacement, and the sum of the rest;
 - `radiance.py`: the radiance of all orders in any direction;
-- `exits.py`: what leaves a slab and what is inside, with the error of every number;
 - `request.py`: what is asked for, and what is refused;
-- `light.py`: the numbers of both sides by name.
+- `light.py`: what leaves a slab and what is inside, of both sides by name, with the error of every number.
 """

@@ -48,11 +48,8 @@ Array = NDArray[np.float64]
 class Edges:
     """Moments of one order, or of a sum of orders, at the edges of the panels, for unit flux across the beam.
 
-    Parameters
-    ----------
-    up, down, fluence
-        (3, P + 1): flux through the horizontal plane and fluence [1], their first moment in x [mean free paths], and
-        their second moment in x^2 + y^2.
+    `up`, `down`, `fluence`: (3, P + 1): flux through the horizontal plane and fluence [1], their first moment in x
+    [mean free paths], and their second moment in x^2 + y^2.
     """
 
     up: Array

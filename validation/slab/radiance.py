@@ -9,7 +9,7 @@ The source at a direction of the user is summed over the modes of the azimuth,
 and carried to the depths. The peak that the streams cannot resolve is left in the beam (delta-M): with f its share,
 depths are (1 - albedo f) z and the albedo albedo (1 - f)/(1 - albedo f). The last term has the true phase function
 over 1 - albedo f (Nakajima and Tanaka 1988, their TMS). With more streams both corrections vanish; the error that
-`exits.py` prints is the change from three quarters of the streams.
+`light.py` prints is the change from three quarters of the streams.
 
 I_m of the exponential source of the beam is known in closed form on the lines of `discrete_ordinates`.
 """

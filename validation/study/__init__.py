@@ -6,7 +6,7 @@ A *study* says which scenes, methods and sizes; a *cell* is one combination of t
 Read in this order:
 
 - `configuration.py`: a method with its kernel and parameters, by the names that a user gives;
-- `study.py`: a study from its TOML file, and its cells; those of reports are in `studies/`;
+- `study.py`: a study from its TOML file, and its cells; those of ours are in `studies/`;
 - `row.py`: what comes of a cell: the columns of a row, with unit and meaning;
 - `frame_times.py`: the times of a frame and of its stages;
 - `reference.py`: the reference that the cells of an image share;
@@ -17,10 +17,9 @@ Read in this order:
 - `keys.py`: what decides the numbers of a row, as a digest;
 - `rows.py`: finished rows on disk, and their Parquet;
 - `cost.py`: what a command will take, and the question before it starts;
-- `decompose.py`: the error of an image by its causes, which add up to it;
+- `causes.py`: the error of an image by its causes, which add up to it;
 - `noise.py`: independent runs of methods that draw random numbers;
 - `motion.py`: methods under a light that moves, frame by frame;
-- `maps.py`: error against the size of the shadow map, and the flicker of a light that moves;
 - `ladders.py`: a scene with less and more of one kind of work, meshes with four times the triangles among it;
-- `growth.py`: what methods cost at each step, and how times grow.
+- `growth.py`: the exponents with which times grow with the work, and errors with the size of the shadow map.
 """

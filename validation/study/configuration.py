@@ -52,7 +52,8 @@ class Configuration:
 _NAMED = tomllib.loads((Path(__file__).parent / "studies" / "methods.toml").read_text(encoding="utf-8"))
 
 
-def _named(word: str) -> tuple[Configuration, ...]:
+def named_configurations(word: str) -> tuple[Configuration, ...]:
+    """Return the configurations that `studies/methods.toml` has under a word."""
     found = []
     for each in _NAMED[word]:
         given = each.get("parameters", {})
@@ -61,7 +62,7 @@ def _named(word: str) -> tuple[Configuration, ...]:
     return tuple(found)
 
 
-STANDARD, QUICK = _named("standard"), _named("quick")  #: see `studies/methods.toml`
+STANDARD, QUICK = named_configurations("standard"), named_configurations("quick")  #: see `studies/methods.toml`
 SHARED_POINTS: Mapping[str, Any] = _NAMED["shared_points"]  #: parameters of `soft-shafts`, beyond Ali 2016
 
 
@@ -70,21 +71,12 @@ def configuration(
 ) -> Configuration:
     """Return a configuration, checked.
 
-    Parameters
-    ----------
-    method
-        A name of `realtime.methods.registry.METHODS`, one's own as 'module:function', 'path/to/file.py:function' or
-        'path/to/file.glsl', or a function itself.
-    kernel
-        See `find_kernel`; 'exact' by default for methods that call a kernel.
-    parameters
-        Values of the method's parameters; words are converted to the type of the default.
+    `method`: a name of `realtime.methods.registry.METHODS`, one's own as 'module:function', 'path/to/file.py:function'
+    or 'path/to/file.glsl', or a function itself; `kernel`: see `find_kernel`; 'exact' by default for methods that call
+    a kernel; `parameters`: values of the method's parameters; words are converted to the type of the default.
 
-    Raises
-    ------
-    InputError
-        For an unknown method, kernel or parameter (the nearest is named), a value of the wrong type or outside its
-        range, values that contradict one another, and a method of one's own that cannot be loaded.
+    Raises InputError for an unknown method, kernel or parameter (the nearest is named), a value of the wrong type or
+    outside its range, values that contradict one another, and a method of one's own that cannot be loaded.
     """
     method = method if isinstance(method, str) else _function_name(method)
     try:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The times of a method by the work of a scene: an exponent that fits all steps, and the steepest between two.
+r"""How a column of rows grows with another: times with the work of a scene, errors with the size of the shadow map.
 
-With the time t = t_0 w^e of the work w, e is the slope of log t over log w, by least squares. What every frame costs,
-whatever the work, makes it smaller. Between two steps a time may grow at most as
+A column t = t_0 w^e of the work w has the exponent e, the slope of log t over log w by least squares. What every frame
+costs, whatever the work, makes that of times smaller. Between two steps a time may grow at most as
 
 | work | a frame | the light moved | objects moved | why |
 |---|---|---|---|---|
@@ -13,38 +13,57 @@ whatever the work, makes it smaller. Between two steps a time may grow at most a
 | texels on a side of a map | 1 | 2 | 2 | a ray crosses a row of texels; the map has their square |
 
 A step that is steeper by more than `CLIFF` is a cliff, where it takes longer than `_SHORT`: something overflows there.
+
+**Errors and maps.** With N texels on a side a shadow edge lies within a texel of its place in the map, an angle
+of O(1/N) as seen from the light. A camera ray that crosses the edge enters or leaves the light too early or too late by
+that angle over the sine of the angle between ray and edge, both as seen from the light. So the airlight of *every* ray
+that crosses a shadow edge is wrong by O(1/N), of either sign: the root of the mean square falls as 1/N, order 1.
+Whether edges are steps or ramps does not matter; what is smooth between them is known to O(1/N^2) where the map is
+interpolated, O(1/N) where it is not.
+
+Rays that graze a shadow add to this. At a distance of delta from touching a smooth outline the part of a ray that is
+hidden has a length of sqrt(delta), and misplacing the outline by epsilon changes it by about epsilon / sqrt(delta). The
+mean square, the integral of epsilon^2 / delta from epsilon on, is epsilon^2 log(1/epsilon): the root still falls with
+order 1, but for the root of a logarithm, and over sizes of N the slope is 1 - 1 / (2 log N): 0.9 at 128. A straight
+edge that the camera sees edge-on hides the rays within epsilon of it whole: there the order is 1/2. Occluders that are
+thinner than a texel do not converge before the map resolves them.
+
+**Upright walls.** Where rays have found the jumps on the edges of texels
+(`realtime.methods.light_volumes.jump_search`) the edge of a shadow is known to epsilon = 1/64 of a texel, or to
+O(1/N^2) where it is a smooth outline between two sides. What is left of order 1 has a constant that is smaller by as
+much. Corners of outlines lie within a texel, which has the wrong shape there: a share of O(1/N) of the rays that cross
+the edge is wrong by O(1/N), a root mean square of O(N^(-3/2)). So the order lies between 1 and 3/2; occluders that are
+thinner than a texel and smooth ones that are met at a grazing angle take from it as above.
+
+**The order of the flicker.** An edge in the map stays where it is while the light moves by less than a texel, and then
+jumps by one. Let the light move by m texels a frame, m = N step / 2 at a step in radians. For m < 1 a share m of the
+edges jumps in a frame, by O(1/N) each: their root mean square is sqrt(m) / N, and at a given step it falls as
+N^(-1/2). For m >= 1 the errors of consecutive frames have nothing to do with each other: the flicker is sqrt(2) times
+the error of a frame and falls as 1/N.
 """
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
-from realtime.errors import InputError
-from realtime.scene.read_scene import Scene
-from validation.clock import time_repeated
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import linregress
+
 from validation.metrics.errors import plain
-from validation.study.configuration import Configuration, configuration, prepared
-from validation.study.frame_times import camera_rays
 from validation.study.ladders import Step
-from validation.study.maps import fitted_slope
-from validation.study.run import REFUSALS, render
-from validation.study.study import Cell, Measure
+from validation.study.row import Row
+from validation.study.run import run
+from validation.study.study import Cell, Study
 
-Progress = Callable[[int, int, str], None]
-
-#: What is measured by default: the defaults of the methods that know shadows, and a marcher on the same map.
-METHODS = (
-    Configuration("shadow-planes", "exact"),
-    Configuration("light-volumes", "exact"),
-    Configuration("min-max", "exact"),
-    Configuration("ray-march", None, (("steps", 100), ("shadow", "map"))),
-)
 TIMES = ("frame", "light_moved", "objects_moved")
 CLIFF = 0.6  #: steeper than the exponent by so much: 4 times the work then takes 2.3 times as long as it may
 _SHORT = 5.0  # a time below which launches and clocks decide [ms]
 #: By kind of work, the exponents of `TIMES`.
-GROWTH = {
+USUAL = {
     "size": (1.0, 1.0, 1.0),
     "triangles": (0.5, 1.0, 1.0),
     "lights": (1.0, 1.0, 1.0),
@@ -52,63 +71,46 @@ GROWTH = {
     "map": (1.0, 2.0, 2.0),
 }
 
-
 Record = dict[str, Any]
 
 
-def study_scaling(
-    kind: str,
-    steps: Sequence[Step],
-    configurations: Sequence[Configuration],
-    *,
-    seconds: float = 0.3,
-    progress: Progress | None = None,
+def study_growth(
+    study: Study, kind: str, steps: Sequence[Step], *, progress: Callable[[int, int, str], None] | None = None
 ) -> list[Record]:
-    """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`.
+    """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`, in the first scene.
 
     Returns
     -------
     list of dict
-        For each method its `label` and the `kind`; `costs`, by step, see `_cost`; `growth`, by name of `TIMES`, see
+        For each method its `scene` with the `size` of its images, its `label` and the `kind`; `costs`, by step the
+        `work`, the `TIMES`, those of the camera `rays` alone and the `memory`; `growth`, by name of `TIMES`, see
         `growth`; and in `refused` why there are no more steps, or None.
     """
-    costs: dict[str, list[Record]] = {chosen.label: [] for chosen in configurations}
-    refused: dict[str, str] = {}
-    total = len(steps) * len(configurations)
+    name, rows = study.scenes[0], list[list[Row]]([] for _ in study.configurations)
     for number, step in enumerate(steps):
         scene = step.scene()
-        for place, chosen in enumerate(configurations):
-            if chosen.label not in refused:
-                try:
-                    costs[chosen.label].append(_cost(scene, step, chosen, seconds))
-                except REFUSALS as error:
-                    refused[chosen.label] = str(error)
+        size = scene.camera.width, scene.camera.height
+        for place, (chosen, own) in enumerate(zip(study.configurations, rows, strict=True)):
+            if all(row.status == "done" for row in own):
+                asked = replace(chosen, parameters=tuple((dict(chosen.parameters) | dict(step.parameters)).items()))
+                own.append(run(Cell(name, size, (), asked, study.measure, (kind, step.work)), scene, None)[0])
             if progress is not None:
-                progress(number * len(configurations) + place + 1, total, f"{kind} {step.work:g}, {chosen.label}")
-    records = []
-    for label, found in costs.items():
-        works = [cost["work"] for cost in found]
-        times = {name: growth(kind, name, works, [cost[name]["median_ms"] for cost in found]) for name in TIMES}
-        records.append({"label": label, "kind": kind, "costs": found, "growth": times, "refused": refused.get(label)})
-    return records
+                done = number * len(rows) + place + 1
+                progress(done, len(steps) * len(rows), f"{kind} {step.work:g}, {chosen.label}")
+    of = {"scene": Path(name).stem, "size": list(study.sizes[0]), "kind": kind}
+    return [of | {"label": each.label} | _record(own, kind) for each, own in zip(study.configurations, rows)]
 
 
-def _cost(scene: Scene, step: Step, chosen: Configuration, seconds: float) -> Record:
-    """Return what a frame costs at one step.
-
-    Beside the `work` and the `TIMES` there are those of the camera `rays` alone, the least that a frame takes which
-    casts them, and the `memory` at the peak, beyond what was there before [MiB].
-    """
-    if step.parameters:
-        own = dict(chosen.parameters) | dict(step.parameters)
-        chosen = configuration(chosen.method, chosen.kernel, own)
-    camera = scene.camera
-    done, _ = render(scene, Cell("", (camera.width, camera.height), (), chosen, Measure("stages", seconds)))
-    if done.times is None:
-        raise InputError(done.reason or "")
-    rays = time_repeated(camera_rays(prepared(scene, chosen)), seconds=0.5 * seconds, least=3)
-    times = {name: getattr(done.times, name) for name in TIMES} | {"rays": rays}
-    return {"work": step.work} | {name: plain(time) for name, time in times.items()} | {"memory": done.memory}
+def _record(rows: Sequence[Row], kind: str) -> Record:
+    """Return what the steps of a method cost, and how its times grow."""
+    costs: list[Record] = []
+    for row in rows:
+        if row.times is not None and row.work is not None:
+            times = {name: plain(getattr(row.times, name)) for name in TIMES} | {"rays": plain(row.work.rays)}
+            costs.append({"work": row.work.amount, "memory": row.memory} | times)
+    works = [cost["work"] for cost in costs]
+    times = {name: growth(kind, name, works, [cost[name]["median_ms"] for cost in costs]) for name in TIMES}
+    return {"costs": costs, "growth": times, "refused": rows[-1].reason}
 
 
 def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float]) -> Record:
@@ -121,13 +123,27 @@ def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float])
         for fewer than three; the `steepest` exponent between two steps that follow one another, the work of the second
         of them, `at`, and whether that is a `cliff`, more than it may be.
     """
-    order, standard_error = fitted_slope(works, times)
+    exponent, standard_error = fitted_exponent(works, times)
     steps = list(pairwise(zip(works, times)))
     local = [
         (math.log(after / before) / math.log(second / first), second) for (first, before), (second, after) in steps
     ]
     steepest, at = max(local, default=(math.nan, math.nan))
-    most = GROWTH[kind][TIMES.index(name)] + CLIFF
+    most = USUAL[kind][TIMES.index(name)] + CLIFF
     cliff = any(slope > most and after > _SHORT for (slope, _), (_, (_, after)) in zip(local, steps))
-    found = {"exponent": -order, "standard_error": standard_error, "steepest": steepest, "at": at, "cliff": cliff}
+    found = {"exponent": exponent, "standard_error": standard_error, "steepest": steepest, "at": at, "cliff": cliff}
     return dict(plain(found))
+
+
+def fitted_exponent(works: ArrayLike, values: ArrayLike) -> tuple[float, float]:
+    """Return the exponent with which values (n,) grow with works (n,), and its standard error.
+
+    The exponent is that of least squares of the logarithms, NaN for fewer than two values that are positive and finite;
+    its standard error, from the scatter about the line, for fewer than three.
+    """
+    n, e = np.asarray(works, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    counts = (e > 0) & np.isfinite(e)
+    if counts.sum() < 2:
+        return math.nan, math.nan
+    line = linregress(np.log(n[counts]), np.log(e[counts]))
+    return float(line.slope), float(line.stderr) if counts.sum() > 2 else math.nan

@@ -40,8 +40,8 @@ from realtime.scene.read_scene import Scene, read_scene
 from validation.scenes.loading import load_scene
 from validation.scenes.meshes import divided, rotation
 from validation.scenes.parts import mesh_with_material
+from validation.study.study import GROWTH
 
-KINDS = ("size", "triangles", "lights", "media", "map")
 MOST_TRIANGLES = 5_300_000  #: a mesh of so many takes some gigabytes with what is made of it
 _SIDES = (0.5, 1, 2, 4)  # of the image
 _COPIES = (1, 2, 4, 8)  # of each light
@@ -62,13 +62,13 @@ class Step:
 
 
 def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
-    """Return the steps of a kind of work, of `KINDS`, for a scene at a size [pixels], the least work first.
+    """Return the steps of a kind of work, of `GROWTH`, for a scene at a size [pixels], the least work first.
 
     A scene that has nothing of the kind of which there could be less or more is refused.
     """
     makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "media": _media, "map": _maps}
     if kind not in makers:
-        raise InputError(f"scaling: got {kind!r}, wanted some of {', '.join(KINDS)}, with commas between them")
+        raise InputError(f"scaling: got {kind!r}, wanted some of {', '.join(GROWTH)}, with commas between them")
     return makers[kind](name_or_path, size)
 
 

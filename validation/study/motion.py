@@ -31,12 +31,6 @@ from validation.study.frame_times import timed_image
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
-USUAL = (
-    Configuration("shadow-planes", "exact"),
-    Configuration("froxel-fog", None),
-    Configuration("froxel-fog+history", None, (("alpha", 0.1),)),
-    Configuration("ray-march+history", None, (("steps", 16), ("jitter", "white"), ("alpha", 0.1))),
-)
 BEFORE = 8  #: frames at rest before a step
 _JUMP = 12  # of a turn, that a step is
 

@@ -22,13 +22,6 @@ from validation.study.frame_times import brief_times
 
 Array = NDArray[np.float64]
 
-USUAL = (
-    Configuration("shadow-planes", "exact"),
-    Configuration("ray-march", None, (("steps", 16),)),
-    Configuration("ray-march", None, (("steps", 16), ("jitter", "white"))),
-    Configuration("ray-march", None, (("steps", 16), ("jitter", "blue"))),
-    Configuration("equi-angular", None),
-)
 _SURE = 2.0  # standard errors, below which the mean of the runs is not told from the reference
 
 

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from validation.clock import Timing
 from validation.columns import Column, column, columns_of, values_of
 from validation.metrics.colour import ColourDifference
 from validation.metrics.errors import RADIANCE, Metrics, plain
@@ -88,6 +89,15 @@ class Cost:
 
 
 @dataclass(frozen=True)
+class Work:
+    """A step of a kind of work, of which there is more and less (`validation.study.ladders`)."""
+
+    kind: str = column("work", meaning="'size', 'triangles', 'lights', 'media' or 'map'")
+    amount: float = column("amount", "1", "pixels, triangles, lights, bounded media, or texels on a side of the map")
+    rays: Timing | None = column("rays alone", meaning="camera rays without shading", default=None)
+
+
+@dataclass(frozen=True)
 class Origin:
     """Where and by what a row was computed."""
 
@@ -148,6 +158,7 @@ class Row:
         default=None,
     )
     cost: Cost | None = None
+    work: Work | None = column(meaning="that a step of growing work has", default=None)
     origin: Origin | None = None
     properties: Mapping[str, float] = field(default_factory=dict)  #: of the scene, by name
     key: str | None = column(meaning="digest of everything that decides the numbers: the identity", default=None)

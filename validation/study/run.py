@@ -27,16 +27,16 @@ from realtime.methods.shader.source import is_shader
 from realtime.numerics.recorded import Frozen
 from realtime.scene.read_scene import Scene, read_scene
 from reference.storage.exr import Image
-from validation.clock import largest_memory, peak_memory, stopwatch, timed
+from validation.clock import largest_memory, peak_memory, stopwatch, time_repeated, timed
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
 from validation.motion.noise import parts_of_error, student
 from validation.study.configuration import Configuration, prepared, rendered_lights
-from validation.study.frame_times import brief_times, shader_times, time_frame
+from validation.study.frame_times import brief_times, camera_rays, shader_times, time_frame
 from validation.study.reference import Reference, load_cell
-from validation.study.row import Cost, Row, RunsError, StatedError
+from validation.study.row import Cost, Row, RunsError, StatedError, Work
 from validation.study.stated_errors import stated_bound, worth_of_ends
 from validation.study.study import Cell, map_side, seed_of
 
@@ -57,7 +57,7 @@ _LONG = 25.0  # after a longer first frame, compilation included, no larger fram
 def run(
     cell: Cell,
     scene: Scene,
-    reference: Reference,
+    reference: Reference | None,
     *,
     timed_scene: Scene | None = None,
     whole: Any = None,
@@ -66,10 +66,10 @@ def run(
 ) -> tuple[Row, Frame | None]:
     """Render, time and compare a cell.
 
-    Scene and reference are of the same image, at the size of the cell; frames are timed in `timed_scene` where that is
-    given. `whole` is the `mi.Scene` that both were read from: without it no error is held against what the method
-    states. `paint` makes the picture of the row, and `apart` calls a user's method in a process of its own. The row
-    lacks what only the caller knows: key, study, origin.
+    Scene and reference are of the same image, at the size of the cell; without a reference nothing is compared. Frames
+    are timed in `timed_scene` where that is given. `whole` is the `mi.Scene` that both were read from: without it no
+    error is held against what the method states. `paint` makes the picture of the row, and `apart` calls a user's
+    method in a process of its own. The row lacks what only the caller knows: key, study, origin.
     """
     took = stopwatch()
     runs: list[Array] = []
@@ -78,9 +78,11 @@ def run(
             row, frame, runs = apart(render_cell, cell, name=cell.chosen.method)
         else:
             row, frame = render(scene, cell, timed_scene=timed_scene)
-            runs = [] if frame is None else _other_runs(scene, cell)
+            runs = [] if frame is None or reference is None else _other_runs(scene, cell)
     except REFUSALS as error:
         row, frame = cell_row(cell, status="refused", reason=str(error)), None
+    if reference is None:
+        return row, frame
     row = replace(row, reference=reference.own_error)
     if frame is None:
         return row, None
@@ -118,7 +120,7 @@ def cell_row(cell: Cell, **outcome: Any) -> Row:
         seed=seed_of(cell.scene),
         medium=" ".join(cell.medium) or None,
         command=_command(cell),
-        **{"status": "done", **outcome},
+        **{"status": "done", "work": Work(*cell.work) if cell.work else None, **outcome},
     )
 
 
@@ -178,7 +180,11 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     if timed_scene is not None and took and took[0] < _RECORDED:
         memory = peak_memory(again)
     times = time_frame(shown, seconds=wanted.seconds, slow=wanted.slow, took=took[-1] if took else None)
-    return row_of(cost=cost, times=times, memory=memory, note="; ".join(notes) or None), frame
+    row = row_of(cost=cost, times=times, memory=memory, note="; ".join(notes) or None)
+    if row.work is None:
+        return row, frame
+    rays = time_repeated(camera_rays(shown), seconds=0.5 * wanted.seconds, least=3)
+    return replace(row, work=replace(row.work, rays=rays)), frame
 
 
 def _other_runs(scene: Scene, cell: Cell) -> list[Array]:

@@ -163,7 +163,7 @@ class SceneResult:
     study: SceneStudy
     reference: ReferenceImage
     agreement: Mapping[str, Any]  #: by estimator and layer, `validation.estimates.agreement.Agreement` as JSON has it
-    multiple: Mapping[str, Any]  #: `validation.estimates.multiple_scattering.MultipleScattering` as JSON has it
+    multiple: Mapping[str, Any]  #: of `validation.estimates.multiple_scattering`
     rows: tuple[Judged, ...]
     seconds: Mapping[str, float]  #: that its parts took when they were computed
     results: tuple[Result, ...] = field(repr=False, default=())  #: every part, as it was kept
@@ -324,9 +324,12 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
 
 
 def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
-    from validation.engine.images import measure_image
+    from validation.engine.images import image_times, measure_image, notes_of
 
-    measured = measure_image(shown, study.loaded, study.reference_of, surfaces=study.scene.features.surfaces)
+    timed = image_times(shown.path)
+    judged, layers, surface = measure_image(
+        shown, study.loaded, study.reference_of, surfaces=study.scene.features.surfaces
+    )
     row = Row(
         scene=study.path,
         label=shown.label,
@@ -336,21 +339,20 @@ def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
         width=study.size[0],
         height=study.size[1],
         status="done",
-        note=measured.notes,
+        note=notes_of(judged, timed),
         kind="image",
-        layer=measured.judged.expected,
-        pixel=measured.judged.pixel,
-        error=measured.judged.comparison.metrics,
-        surface_error=measured.surface_error,
+        layer=judged.expected,
+        pixel=judged.pixel,
+        error=judged.comparison.metrics,
+        surface_error=surface,
     )
-    arrays = {f"{_LAYER}{name}": values for name, values in measured.image.layers.items()}
-    arrays["expected"] = measured.judged.truth
-    truth = measured.judged.fit.truth
-    if measured.judged.expected == TOTAL:
-        arrays["whole"] = measured.judged.truth
-    elif "surface" in measured.image.layers or not np.any(truth.surface > 0):
+    arrays: dict[str, Any] = {f"{_LAYER}{name}": values for name, values in layers.items()}
+    arrays["expected"], truth = judged.truth, judged.fit.truth
+    if judged.expected == TOTAL:
+        arrays["whole"] = judged.truth
+    elif "surface" in layers or not np.any(truth.surface > 0):
         arrays["whole"] = truth.airlight + truth.surface
-    times = {} if measured.times is None else {"times": {"frame": plain(measured.times[0])}}
+    times = {} if timed is None else {"times": {"frame": plain(timed[0])}}
     return plain(row) | times, arrays
 
 

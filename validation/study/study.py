@@ -53,7 +53,14 @@ from validation.scenes.changes import change_words
 from validation.scenes.loading import parse_size
 from validation.scenes.random.design import PREFIX, is_random, random_name, read_ranges
 from validation.scenes.registry import FOG_SCENES, SCENES
-from validation.study.configuration import QUICK, Configuration, chosen_configurations, configuration, find_kernel
+from validation.study.configuration import (
+    QUICK,
+    Configuration,
+    chosen_configurations,
+    configuration,
+    find_kernel,
+    named_configurations,
+)
 
 #: How frames are timed: 'none'; 'with' the computation of errors, briefly, whatever else runs on the host; 'alone',
 #: where nothing else of the study runs there; 'stages': all stages, and frames after light, objects or colours changed.
@@ -61,13 +68,13 @@ TIMES = ("none", "with", "alone", "stages")
 
 SIZE = (160, 120)  #: of the images where a study gives none [pixels]
 
-#: Studies of ours, and the kinds of work by which times may grow.
+#: The studies of reports, and the kinds of work by which times may grow.
 STUDIES = ("quick", "default", "full")
 GROWTH = ("size", "triangles", "lights", "media", "map")
 
 _FOLDER = Path(__file__).parent / "studies"
 
-_METHOD_SETS = ("all", "quick", "standard")
+_METHOD_SETS = ("all", "quick", "standard", "growth", "causes", "noise", "motion")
 _LONGEST = 86400.0
 _MOST_RETRIES = 100
 _MOST_SCENES = 10_000_000
@@ -95,6 +102,7 @@ class Cell:
     medium: tuple[str, ...]  #: changes of the medium, as `parse_changes` reads them
     chosen: Configuration
     measure: Measure = Measure()
+    work: tuple[str, float] | None = None  #: kind and amount, of a step of `validation.study.ladders`
 
     @property
     def image(self) -> "Cell":
@@ -267,7 +275,7 @@ def parse_study(data: Mapping[str, Any], *, folder: Path = Path(), name: str = "
 
 @cache
 def standard_study(name: str) -> Study:
-    """Return a study of ours by its name, one of `STUDIES`."""
+    """Return a study of ours by its name, that of a file in `studies/`."""
     return read_study(_FOLDER / f"{name}.toml")
 
 
@@ -277,8 +285,8 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     asked = data.get("methods", "all")
     if isinstance(asked, str):
         read_one_of("methods", asked, names=_METHOD_SETS)
-        sets = {"quick": lambda: QUICK, "standard": lambda: chosen_configurations(list(FOG_METHODS))}
-        standard = sets.get(asked, default_configurations)()
+        sets = {"all": default_configurations, "standard": lambda: chosen_configurations(list(FOG_METHODS))}
+        standard = sets[asked]() if asked in sets else named_configurations(asked)
         if not (parameters or "kernels" in data or "maps" in data):
             return standard
         names = list(dict.fromkeys(each.method for each in standard))

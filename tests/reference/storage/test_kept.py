@@ -38,7 +38,7 @@ from validation.estimates.multiple_scattering import multiple_scattering_fractio
 from validation.kernels.rays import _reference
 from validation.kernels.stability import stability
 from validation.metrics.flip import flip_hdr
-from validation.study.growth import study_scaling
+from validation.study.growth import study_growth
 from validation.study.reference import sampled_reference
 from validation.study.run import run
 from validation.study.scene import _image_measured, _measured, check_reference
@@ -206,7 +206,7 @@ def functions():
         "scene-image": (_image_measured, "validation.metrics.errors"),
         "flip": (flip_hdr, "validation.metrics.errors"),
         "report-stability": (stability, "realtime.kernels.exact"),
-        "report-scaling": (study_scaling, "realtime.methods.ray_march"),
+        "report-scaling": (study_growth, "realtime.methods.ray_march"),
         "shader-driver": (driver_error, "realtime.export.text"),
     }
 

@@ -241,8 +241,8 @@ def test_labels_that_would_share_a_file_get_numbers():
 def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
     from reports.report import others
 
-    monkeypatch.setattr(others, "_GROWING", "open-fog")
-    monkeypatch.setattr(others, "_GROWING_SIZE", (16, 12))
+    small = replace(others.standard_study("scaling").at((16, 12)), scenes=("open-fog",))
+    monkeypatch.setattr(others, "standard_study", lambda name: small)
     data = write_report(tmp_path, replace(TINY, scenes=("open-fog",), growth=("size",)))
     assert len(data.scaling) == 4  # methods
     assert [cost.work for cost in data.scaling[0].costs] == [48, 192, 768, 3072]

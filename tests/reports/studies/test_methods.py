@@ -73,7 +73,7 @@ def test_scaling_that_jumps_ends_with_1(variant, capfd, monkeypatch):
     arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed", "--size", "80x60"]
     for jump, status in ((False, 0), (True, 1)):
         found = growth_record(cliff=jump) | {"scene": "sphere-spot"}
-        monkeypatch.setattr("validation.study.growth.study_scaling", lambda *given, found=found, **options: [found])
+        monkeypatch.setattr("validation.study.growth.study_growth", lambda *given, found=found, **options: [found])
         assert printed(capfd, *arguments, status=status)["scaling"] == [found]
 
 

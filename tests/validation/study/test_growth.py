@@ -9,8 +9,9 @@ from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 from validation.study.configuration import configuration
-from validation.study.growth import growth, study_scaling
+from validation.study.growth import growth, study_growth
 from validation.study.ladders import ladder, subdivided, triangles_of
+from validation.study.study import Measure, Study
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.37, 1.0, 1.7])
@@ -52,14 +53,19 @@ def test_what_a_scene_does_not_have_is_refused(kind, scene, why, variant):
 def test_a_study_measures_every_step_and_says_who_refuses(variant):
     steps = ladder("map", "sphere-spot", (24, 18))[:2]
     told = []
-    found = study_scaling(
-        "map",
-        steps,
-        [configuration("light-volumes"), configuration("unshadowed")],
-        seconds=0.01,
-        progress=lambda *done: told.append(done),
+    study = Study(
+        scenes=("sphere-spot",),
+        sizes=((24, 18),),
+        configurations=(configuration("light-volumes"), configuration("unshadowed")),
+        measure=Measure("stages", 0.01),
     )
+    found = study_growth(study, "map", steps, progress=lambda *done: told.append(done))
     measured, refused = found
+    assert (measured["scene"], measured["size"], measured["label"]) == (
+        "sphere-spot",
+        [24, 18],
+        "light-volumes (exact)",
+    )
     assert [cost["work"] for cost in measured["costs"]] == [128, 256]
     assert all(cost[name]["median_ms"] > 0 for cost in measured["costs"] for name in ("frame", "rays"))
     assert measured["refused"] is None

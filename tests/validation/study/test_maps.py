@@ -13,9 +13,9 @@ from tests.helpers.scenes import spot, tiny_scene
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.registry import Animation
+from validation.study.causes import decompose
 from validation.study.configuration import configuration, prepared
-from validation.study.decompose import decompose
-from validation.study.maps import fitted_slope
+from validation.study.growth import fitted_exponent
 from validation.study.motion import method_motion
 
 # Steps enough that halving them changes no error below by more than 2 %.
@@ -31,8 +31,8 @@ def marches(*sizes):
 
 
 def test_what_has_no_logarithm_is_left_out():
-    assert fitted_slope([8, 16, 32, 64, 128], [0.5, 0.25, 0.0, math.nan, math.inf])[0] == pytest.approx(1)
-    assert math.isnan(fitted_slope([8, 16], [0.0, 0.1])[0])
+    assert fitted_exponent([8, 16, 32, 64, 128], [0.5, 0.25, 0.0, math.nan, math.inf])[0] == pytest.approx(-1)
+    assert math.isnan(fitted_exponent([8, 16], [0.0, 0.1])[0])
 
 
 @pytest.mark.slow
@@ -44,8 +44,8 @@ def test_errors_of_a_map_are_of_first_order(variant, lamp):
     sizes = (16, 32, 64, 128, 256)
     read, truth = read_scene(scene), reference_image(scene).airlight
     metrics = [error_metrics(truth, render_frame(prepared(read, chosen)).airlight) for chosen in marches(*sizes)]
-    order, standard_error = fitted_slope(sizes, [each.relative_rmse for each in metrics])
-    assert order == pytest.approx(1, abs=0.2)
+    exponent, standard_error = fitted_exponent(sizes, [each.relative_rmse for each in metrics])
+    assert exponent == pytest.approx(-1, abs=0.2)
     assert 0 < standard_error < 0.1
     assert metrics[0].relative_rmse < 0.04
     assert all(each.nonfinite == 0 for each in metrics)
@@ -60,7 +60,7 @@ def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     sizes = (32, 64, 128, 256)
     turn = round(2 * np.pi / 2e-3)  # so that a shadow moves by 0.03 to 0.26 texels a frame
     found = method_motion(scene, Animation(), marches(*sizes), frames=17, turn=turn)
-    assert fitted_slope(sizes, [row["flicker"] for row in found])[0] == pytest.approx(0.5, abs=0.2)
+    assert fitted_exponent(sizes, [row["flicker"] for row in found])[0] == pytest.approx(-0.5, abs=0.2)
     assert all(row["nonfinite"] == 0 for row in found)
 
 
@@ -68,8 +68,9 @@ def split(method, kernel=None, *, size=(24, 20), render=None, **parameters):
     cube = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.3)}
     lamp = {"type": "point", "position": [0.3, 0.4, 3.1], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
     scene = mi.load_dict(tiny_scene(size=size, ball=cube, lamp=lamp))
-    truth = reference_image(scene).airlight
-    return decompose(read_scene(scene), configuration(method, kernel, parameters), truth, render=render)
+    read, reference = read_scene(scene), reference_image(scene).airlight
+    render = render or (lambda chosen: render_frame(prepared(read, chosen)).airlight)
+    return decompose(read, configuration(method, kernel, parameters), reference, render)
 
 
 def causes(parts):

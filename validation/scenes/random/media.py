@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.phase import phase_from_words
+from validation.properties.view import chord
 from validation.scenes.random.design import Draws, Ranges
 
 Array = NDArray[np.float64]
@@ -130,23 +131,13 @@ def optical_depths(media: list[Medium], start: Array, end: Array) -> Array:
     outside = length.copy()
     for medium in media:
         if medium.bounds != "endless":
-            chord = _chord(medium, start, way, length)
-            outside -= chord
-            depth += chord[..., None] * medium.sigma_t
+            inside = chord(medium.centre, medium.ball, start, way, length)
+            outside -= inside
+            depth += inside[..., None] * medium.sigma_t
     for medium in media:
         if medium.bounds == "endless":
             depth += np.maximum(outside, 0)[..., None] * medium.sigma_t
     return depth
-
-
-def _chord(medium: Medium, start: Array, way: Array, length: Array) -> Array:
-    """Return how much of segments lies in the ball of a medium."""
-    square = np.maximum(length**2, 1e-30)
-    from_centre = start - medium.centre
-    middle = -np.sum(from_centre * way, axis=-1) / square
-    closest = np.sum((from_centre + middle[..., None] * way) ** 2, axis=-1)
-    reach = np.sqrt(np.maximum(medium.ball**2 - closest, 0) / square)
-    return length * np.maximum(np.minimum(middle + reach, 1) - np.maximum(middle - reach, 0), 0)
 
 
 @dataclass(frozen=True)

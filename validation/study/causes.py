@@ -20,21 +20,19 @@ so that the shares add up to 1. A share below 0 is of a part that hides others.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.points import LightPoints
-from realtime.frame.renderer import render_frame
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
 from realtime.parameters import values
 from realtime.scene.read_scene import Scene
-from validation.study.configuration import Configuration, prepared
+from validation.study.configuration import Configuration
 
 Array = NDArray[np.float64]
-Render = Callable[[Configuration], Array]  #: airlight of a configuration, (height, width, 3) [W/(m^2 sr)]
 
 REST, POINTS = "rest", "light points"
 
@@ -46,57 +44,31 @@ Part = tuple[dict[str, Any], Array]
 
 
 def decompose(
-    scene: Scene,
-    chosen: Configuration,
-    truth: Array,
-    *,
-    render: Render | None = None,
-    exact: Callable[[LightPoints], Array] | None = None,
+    scene: Scene, chosen: Configuration, reference: Array, airlight: Callable[[Configuration], Array]
 ) -> list[Part]:
     """Return the whole error of a configuration, and the parts by its causes, which add up to it.
 
-    The truth is that at pixel centres, (height, width, 3) [W/(m^2 sr)]. `render` renders a configuration of one's own,
-    in a process of its own for example, and `exact` the exact sum over light points, for callers that keep it.
+    The reference is that at pixel centres, (height, width, 3) [W/(m^2 sr)]; `airlight` renders a configuration in the
+    scene to such an image.
     """
-
-    def airlight(configuration: Configuration) -> Array:
-        own = render if render is not None and configuration.own else lambda each: rendered(scene, each)
-        return np.asarray(own(configuration), dtype=np.float64)
-
-    truth = np.asarray(truth, dtype=np.float64)
-    image = last = airlight(chosen)
-    best = truth
-    if scene.area_lights:
-        points = method_parameters(find_method(chosen.method), dict(chosen.parameters))[1]
-        best = np.asarray(exact_sum(scene, points) if exact is None else exact(points), dtype=np.float64)
-    steps: list[tuple[str, str, Array]] = []
-    left = REST
-    before = chosen
+    images, named = [airlight(chosen)], [("whole", "reference")]
+    left, last = REST, chosen
     for cause, without in _configurations(chosen, (scene.camera.width, scene.camera.height)):
         if without is None:
             left = cause
             break
-        better = airlight(without)
-        steps.append((cause, _changes(before, without), last - better))
-        last, before = better, without
+        named.append((cause, _changes(last, without)))
+        images.append(airlight(without))
+        last = without
     if scene.area_lights:
-        steps.append((left, "exact sum", last - best))
-        steps.append((POINTS, "reference", best - truth))
-    else:
-        steps.append((left, "reference", last - truth))
-    whole = image - truth
-    steps = [("whole", "reference", whole), *steps]
-    return [(_numbers(cause, without, part, whole, truth), part) for cause, without, part in steps]
-
-
-def exact_sum(scene: Scene, points: LightPoints) -> Array:
-    """Return the airlight of the light points of a scene, exactly, (height, width, 3) [W/(m^2 sr)]."""
-    return rendered(scene, Configuration("shadow-planes", "exact", tuple(values(points).items())))
-
-
-def rendered(scene: Scene, chosen: Configuration) -> Array:
-    """Return the airlight of a configuration, (height, width, 3) [W/(m^2 sr)]."""
-    return render_frame(prepared(scene, chosen)).airlight
+        points = method_parameters(find_method(chosen.method), dict(chosen.parameters))[1]
+        named.append((left, "exact sum"))
+        images.append(airlight(Configuration("shadow-planes", "exact", tuple(values(points).items()))))
+    named.append((POINTS if scene.area_lights else left, "reference"))
+    images = [np.asarray(image, dtype=np.float64) for image in (*images, reference)]
+    whole = images[0] - images[-1]
+    parts = [whole, *(before - after for before, after in pairwise(images))]
+    return [(_numbers(*words, part, whole, images[-1]), part) for words, part in zip(named, parts, strict=True)]
 
 
 def _configurations(chosen: Configuration, size: tuple[int, int]) -> Iterator[tuple[str, Configuration | None]]:
@@ -124,8 +96,8 @@ def _changes(before: Configuration, after: Configuration) -> str:
     return ", ".join([f"kernel={after.kernel}"] * (before.kernel != after.kernel) + words)
 
 
-def _numbers(cause: str, without: str, image: Array, whole: Array, truth: Array) -> dict[str, Any]:
-    mean, square = float(truth.mean()), float(np.mean(whole * whole))
+def _numbers(cause: str, without: str, image: Array, whole: Array, reference: Array) -> dict[str, Any]:
+    mean, square = float(reference.mean()), float(np.mean(whole * whole))
     rmse, bias = float(np.sqrt(np.mean(image * image))), float(image.mean())
     return {
         "cause": cause,
