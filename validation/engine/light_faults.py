@@ -34,9 +34,9 @@ def _window(change: Callable[[Array], Array]) -> Change:
 
 
 def _ranges(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-    r = np.concatenate([each.nodes.r for each in predictor.light.model(predictor.seen, Scenery(), 0).paths.lights])
+    r = np.concatenate([each.nodes.r for each in predictor.light.model(predictor.seen, Scenery(), 0).lights])
     if not len(r):
-        r = np.concatenate([e.surface.r for e in predictor.light.model(predictor.seen, Scenery(), 1).paths.lights])
+        r = np.concatenate([e.surface.r for e in predictor.light.model(predictor.seen, Scenery(), 1).lights])
     far = float(np.median(r)) if len(r) else 1.0
     return [(far * part,) for part in (0.5, 1.0, 2.0, 4.0)]
 

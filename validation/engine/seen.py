@@ -69,7 +69,7 @@ class Seen:
     def model(self, view: View, lights: tuple[ReferenceLight, ...] | None = None, **how: Any) -> FogModel:
         """Return the paths of the light that the image holds; `how`: see `scattering_paths`."""
         parts = {"airlight": self.holds != SURFACE, "surface": self.holds != AIRLIGHT, "samples": self.samples}
-        return FogModel(scattering_paths(view, lights, **(parts | how)))
+        return FogModel(view, scattering_paths(view, lights, **(parts | how)))
 
     def pixels_of_rays(self, most: int) -> int:
         """Return how many pixels so many rays allow, or the fewest that are looked at."""
@@ -168,7 +168,7 @@ def needed_samples(truth: ReferenceScene) -> int:
     view = view_of(truth, np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(np.int64)))
 
     def image(samples: int) -> Array:
-        return FogModel(scattering_paths(view, samples=samples)).layers(fog).sum(axis=0)
+        return FogModel(view, scattering_paths(view, samples=samples)).layers(fog).sum(axis=0)
 
     values = image(samples)
     while samples < _MOST_SAMPLES:

@@ -89,7 +89,7 @@ class ImageModel:
     @property
     def image(self) -> Array:
         """The values of the image, (m, 3)."""
-        return self.seen.values[self.model.paths.view.pixels]
+        return self.seen.values[self.model.view.pixels]
 
     def radiance(self, fog: Fog) -> Array:
         """Return the radiance of the pixels, (m, 3) [W/(m^2 sr)]."""

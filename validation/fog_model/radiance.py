@@ -28,7 +28,7 @@ from reference.quadrature.height_fog import fog_of
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceScene
 from validation.fog_model.places import AROUND, Places
-from validation.fog_model.view import ScatteringPaths
+from validation.fog_model.view import LightPaths, View
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
@@ -115,13 +115,14 @@ def henyey_greenstein(g: float) -> PhaseLaw:
 class FogModel:
     """The paths of some pixels, and the radiance that a fog gives these."""
 
-    paths: ScatteringPaths
+    view: View
+    lights: tuple[LightPaths, ...]
     _phases: dict[tuple[int, int], Array] = field(default_factory=dict, repr=False)
 
     @property
     def places(self) -> int:
         """How many nodes and surface points there are."""
-        return sum(len(light.nodes.r) + len(light.surface.r) for light in self.paths.lights)
+        return sum(len(light.nodes.r) + len(light.surface.r) for light in self.lights)
 
     def layers(self, fog: Fog) -> Array:
         """Return the radiance of airlight and surfaces, (2, m, 3) [W/(m^2 sr)]."""
@@ -129,10 +130,10 @@ class FogModel:
 
     def by_light(self, fog: Fog) -> Array:
         """Return airlight and surfaces from each light, (2, lights, m, 3) [W/(m^2 sr)]; no number is out of range."""
-        view = self.paths.view
-        radiance = np.zeros((2, len(self.paths.lights), len(view.pixels), 3))
+        view = self.view
+        radiance = np.zeros((2, len(self.lights), len(view.pixels), 3))
         with np.errstate(over="ignore", invalid="ignore"):
-            for number, light in enumerate(self.paths.lights):
+            for number, light in enumerate(self.lights):
                 for layer, places in enumerate((light.nodes, light.surface)):
                     if len(places.r):
                         radiance[layer, number] = self._sums(places, fog, number) * light.intensity
@@ -141,7 +142,7 @@ class FogModel:
 
     def transmittance(self, fog: Fog) -> Array:
         """Return the fraction of light that the rays leave of what is at their ends, (m, 3) [1]."""
-        view = self.paths.view
+        view = self.view
         slant = 1.0 if fog.spherical else 1 / (view.truth.direction @ view.axis)
         length = view.length.copy()
         length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * slant) - fog.near * slant, 0.0)
@@ -156,7 +157,7 @@ class FogModel:
 
     def _sums(self, places: Places, fog: Fog, number: int) -> Array:
         """Return what the places send to each pixel, of a light of intensity 1, (m, 3)."""
-        view = self.paths.view
+        view = self.view
         layer = int(places.is_surface)
         direction, pixel = view.truth.direction[places.ray], view.ray_pixel[places.ray]
         slant = 1 / (direction @ view.axis)
@@ -207,7 +208,7 @@ class FogModel:
 
         `away` is from the light to the places, (n, 3) [m]. Surfaces scatter by no density.
         """
-        truth, density = self.paths.view.truth, fog.height
+        truth, density = self.view.truth, fog.height
         assert density is not None
         origin = truth.origin @ fog.up
         z = origin + places.x * (truth.direction[places.ray] @ fog.up)
@@ -227,7 +228,8 @@ class FogModel:
             return law(cosine)
         key = number, medium  # the scene's own does not change, not even where a light moves a little
         if key not in self._phases:
-            own = self.paths.media[medium].phase
+            truth = self.view.truth
+            own = (truth.medium, *truth.media)[medium].phase
             self._phases[key] = np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
         return self._phases[key]
 

@@ -22,9 +22,8 @@ from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.device import as_rows, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene
+from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import read_shapes
-from reference.scene.varying import VaryingMedium
 from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.exact_distance import exact_distance
@@ -35,7 +34,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Light = ReferenceLight | DirectionalLight
-Progress = Callable[[float, str], None]
 
 SAMPLES = 16  #: of an area light
 _FEW = 1000  # rays
@@ -182,15 +180,6 @@ class LightPaths:
     surface: Places
 
 
-@dataclass(frozen=True)
-class ScatteringPaths:
-    """All paths of some pixels of an image."""
-
-    view: View
-    media: tuple[ReferenceMedium | VaryingMedium, ...]  #: that without bounds first
-    lights: tuple[LightPaths, ...]
-
-
 def scattering_paths(
     view: View,
     lights: Sequence[ReferenceLight] | None = None,
@@ -202,21 +191,17 @@ def scattering_paths(
     airlight: bool = True,
     surface: bool = True,
     samples: int = SAMPLES,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> ScatteringPaths:
-    """Return all paths of a view.
+) -> tuple[LightPaths, ...]:
+    """Return all paths of a view, by light.
 
     `lights`: point and spot lights in the place of those of the scene; `radius`: of spheres that take the place of
     point lights, of the same intensity [m]; `blend`: fraction of 1 - cos(cut-off), from the cut-off inwards, in which
     spots fall off smoothly, besides their own edge; `ends`: distances between which rays have nodes, (rays,) each [m];
-    `shadows`: false where surfaces hide nothing from the lights; `samples`, `seed`: how many samples stand for an area
-    light, and their seed.
+    `shadows`: false where surfaces hide nothing from the lights; `samples`: how many stand for an area light.
     """
     truth = view.truth if lights is None else replace(view.truth, lights=tuple(lights))
-    sources = light_sources(truth, samples, seed, radius)
     paths = []
-    for number, source in enumerate(sources):
+    for source in light_sources(truth, samples, radius):
         nodes, lit = [no_places(len(truth.media) + 1, surface=False)], [no_places(len(truth.media) + 1, surface=True)]
         for given in source.lights:
             light = _whole_within(given, blend) if blend else given
@@ -230,9 +215,7 @@ def scattering_paths(
                 points = surface_points(truth, light, view.distance, reflected, visible)
                 lit.append(_edged(points, light, source, blend))
         paths.append(LightPaths(source.name, np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
-        if progress is not None:
-            progress((number + 1) / len(sources), "lit intervals")
-    return ScatteringPaths(view, (truth.medium, *truth.media), tuple(paths))
+    return tuple(paths)
 
 
 @dataclass(frozen=True)
@@ -246,7 +229,7 @@ class Source:
     area: ReferenceAreaLight | None = None  #: that has this extent in the scene
 
 
-def light_sources(truth: ReferenceScene, samples: int = SAMPLES, seed: int = 0, radius: float = 0.0) -> list[Source]:
+def light_sources(truth: ReferenceScene, samples: int = SAMPLES, radius: float = 0.0) -> list[Source]:
     """Return the lights of a scene: point and spot lights, directional ones, then area lights.
 
     The parameters are those of `scattering_paths`.
@@ -254,7 +237,7 @@ def light_sources(truth: ReferenceScene, samples: int = SAMPLES, seed: int = 0, 
     emitters = truth.scene.emitters()
     far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
     near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
-    plan = PointPlan(most=samples, seed=seed)
+    plan = PointPlan(most=samples)
     near = [
         _as_sphere(name, light, plan, radius)
         if radius > 0 and light.axis is None

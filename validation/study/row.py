@@ -89,7 +89,7 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Work:
+class Growth:
     """A step of a kind of work, of which there is more and less (`validation.study.ladders`)."""
 
     kind: str = column("work", meaning="'size', 'triangles', 'lights', 'media' or 'map'")
@@ -158,7 +158,7 @@ class Row:
         default=None,
     )
     cost: Cost | None = None
-    work: Work | None = column(meaning="that a step of growing work has", default=None)
+    work: Growth | None = column(meaning="that a step of growing work has", default=None)
     origin: Origin | None = None
     properties: Mapping[str, float] = field(default_factory=dict)  #: of the scene, by name
     key: str | None = column(meaning="digest of everything that decides the numbers: the identity", default=None)

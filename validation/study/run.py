@@ -36,7 +36,7 @@ from validation.motion.noise import parts_of_error, student
 from validation.study.configuration import Configuration, prepared, rendered_lights
 from validation.study.frame_times import brief_times, camera_rays, shader_times, time_frame
 from validation.study.reference import Reference, load_cell
-from validation.study.row import Cost, Row, RunsError, StatedError, Work
+from validation.study.row import Cost, Growth, Row, RunsError, StatedError
 from validation.study.stated_errors import stated_bound, worth_of_ends
 from validation.study.study import Cell, map_side, seed_of
 
@@ -120,7 +120,7 @@ def cell_row(cell: Cell, **outcome: Any) -> Row:
         seed=seed_of(cell.scene),
         medium=" ".join(cell.medium) or None,
         command=_command(cell),
-        **{"status": "done", "work": Work(*cell.work) if cell.work else None, **outcome},
+        **{"status": "done", "work": Growth(*cell.work) if cell.work else None, **outcome},
     )
 
 

@@ -89,7 +89,8 @@ def test_a_light_with_a_radius_is_named(variant, tmp_path):
         <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape></scene>"""
     )
     own = read_reference(load_scene(str(path), SIZE).scene)
-    model = FogModel(scattering_paths(view_of(own), radius=0.25, samples=64))
+    view = view_of(own)
+    model = FogModel(view, scattering_paths(view, radius=0.25, samples=64))
     image = model.layers(scene_fog(own)).sum(axis=0).reshape(SIZE[1], SIZE[0], 3)
     assert diagnosed(image, str(path)).first == "light-radius"
 

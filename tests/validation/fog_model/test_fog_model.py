@@ -25,7 +25,8 @@ def relative(values, wanted):
 
 def model_and_image(name):
     truth = read_reference(load_scene(name, SIZE).scene)
-    return truth, FogModel(scattering_paths(view_of(truth))), quadrature_image(truth)
+    view = view_of(truth)
+    return truth, FogModel(view, scattering_paths(view)), quadrature_image(truth)
 
 
 @pytest.mark.claim("fit-model")
@@ -62,13 +63,14 @@ def test_radiance_in_height_fog_is_that_of_the_reference(variant, tmp_path):
 
 def test_laws_can_be_changed_one_by_one(variant):
     truth = read_reference(load_scene("open-fog", SIZE).scene)
-    model, fog = FogModel(scattering_paths(view_of(truth))), scene_fog(truth)
-    nodes = model.paths.lights[0].nodes
+    view = view_of(truth)
+    model, fog = FogModel(view, scattering_paths(view)), scene_fog(truth)
+    nodes = model.lights[0].nodes
     right = model.layers(fog)[0]
     sigma_t = fog.sigma_t[0][0]
-    strength = truth.medium.albedo[0] * sigma_t * model.paths.lights[0].intensity[0] / (4 * np.pi)
+    strength = truth.medium.albedo[0] * sigma_t * model.lights[0].intensity[0] / (4 * np.pi)
     direction = truth.direction[nodes.ray]
-    axis = model.paths.view.axis
+    axis = model.view.axis
 
     def summed(depth, power=2.0, factor=1.0):
         value = factor * nodes.value[:, 0] / nodes.r**power

@@ -6,8 +6,10 @@ import pytest
 
 from analytic.errors import InputError
 from validation.scenes.loading import load_scene
-from validation.study.configuration import Configuration
-from validation.study.motion import USUAL, method_motion
+from validation.study.configuration import Configuration, named_configurations
+from validation.study.motion import method_motion
+
+USUAL = named_configurations("motion")
 
 
 @pytest.mark.claim("history-lag", tolerance="0.01 frames: float32 beside the light")
