@@ -60,7 +60,7 @@ class Fault:
     held: Callable[[Predictor, Guess, Values, Values], Guess] | None = None
     costly: int = 0  #: 1: tried where nothing of 0 explains the image; 2: where no pair does either
     single: bool = False  #: whether it is not tried together with another one
-    applies: Callable[[Predictor], bool] = lambda predictor: True
+    needs: tuple[str, ...] = ()  #: what the scene and its image must have for it, of `traits`
     undo: Callable[[Array], Array] | None = None  #: the image without it, (height, width, 3) -> the same
     factor: bool = False  #: whether its number is a factor that may have a name
     kind: str = ""  #: of the table that it is in: one of `validation.engine.faults.KINDS`
@@ -139,66 +139,38 @@ def short(value: float, digits: int = 4) -> float:
     return float(f"{value:.{digits}g}")
 
 
-# What a scene must have for a fault.
+def traits(predictor: Predictor) -> dict[str, bool]:
+    """Return whether a scene and its image have what faults need, by the words of `Fault.needs`."""
+    truth, fog, holds, values = predictor.truth, predictor.fog, predictor.seen.holds, predictor.seen.values
+    spots, right = [light for light in truth.lights if light.axis is not None], Guess(fog)
+    shapes, lobes = bool(truth.occluders.shapes()), any(isinstance(g, float) for g in fog.phase)
+    optics = [pair for media in zip(fog.sigma_t, fog.albedo, strict=True) for pair in zip(*media, strict=True)]
+    return {
+        "shapes": shapes,
+        "lamps": bool(truth.lights),  # point and spot lights
+        "point lights": len(spots) < len(truth.lights),
+        "spots": bool(spots),
+        "soft spots": any(0 < light.beam < light.cutoff for light in spots),
+        "no bounds": not truth.media,
+        "height fog": fog.height is not None,
+        "even fog": fog.height is None,
+        "fog": holds != "surface",  # in the image
+        "all light": holds == "total",
+        "both": holds == "total" and shapes,  # fog and surfaces in one layer
+        "absorption": any(s > 0 and a < 1 - 1e-6 for s, a in optics),
+        "lobes": lobes and holds != "surface",  # of Henyey and Greenstein
+        "g": lobes and holds != "surface" and any(fog.phase),  # other than 0
+        "isotropy": not lobes and any(medium.phase.is_constant for medium in (truth.medium, *truth.media)),
+        "square": predictor.shape[0] == predictor.shape[1],
+        "oblong": predictor.shape[0] != predictor.shape[1],
+        "colours": bool(np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values))),
+        "stop": int(np.count_nonzero(values == top(predictor))) >= 8 and top(predictor) > 0,  # of many values
+        # More light than there should be: higher orders take none away.
+        "more light": float(np.median(predictor.shown(right) - predictor.predicted(right))) > 0,
+    }
 
 
-def has_shapes(predictor: Predictor) -> bool:
-    """Return whether anything casts shadows."""
-    return bool(predictor.truth.occluders.shapes())
-
-
-def has_near_lights(predictor: Predictor) -> bool:
-    """Return whether there are point or spot lights."""
-    return bool(predictor.truth.lights)
-
-
-def has_spots(predictor: Predictor) -> bool:
-    """Return whether there are spots."""
-    return any(light.axis is not None for light in predictor.truth.lights)
-
-
-def has_soft_spots(predictor: Predictor) -> bool:
-    """Return whether spots fall off between a beam and a cut-off."""
-    return any(light.axis is not None and 0 < light.beam < light.cutoff for light in predictor.truth.lights)
-
-
-def fog_surrounds(predictor: Predictor) -> bool:
-    """Return whether no medium has bounds."""
-    return not predictor.truth.media
-
-
-def in_height_fog(predictor: Predictor) -> bool:
-    """Return whether the scene asks for height fog."""
-    return predictor.fog.height is not None
-
-
-def shows_fog(predictor: Predictor) -> bool:
-    """Return whether the image shows what media scatter."""
-    return predictor.seen.holds != "surface"
-
-
-def shows_both(predictor: Predictor) -> bool:
-    """Return whether the image shows fog and surfaces in one layer."""
-    return predictor.seen.holds == "total" and has_shapes(predictor)
-
-
-def absorbs(predictor: Predictor) -> bool:
-    """Return whether any medium absorbs."""
-    fog = predictor.fog
-    return any(s > 0 and a < 1 - 1e-6 for ss, aa in zip(fog.sigma_t, fog.albedo) for s, a in zip(ss, aa))
-
-
-def has_lobe(predictor: Predictor) -> bool:
-    """Return whether a phase function is of Henyey and Greenstein."""
-    return any(isinstance(g, float) for g in predictor.fog.phase) and shows_fog(predictor)
-
-
-def has_no_lobe(predictor: Predictor) -> bool:
-    """Return whether all that scatters does so evenly."""
-    media = predictor.truth.medium, *predictor.truth.media
-    return shows_fog(predictor) and not has_lobe(predictor) and any(medium.phase.is_constant for medium in media)
-
-
-def all_of(*wanted: Callable[[Predictor], bool]) -> Callable[[Predictor], bool]:
-    """Return whether all of these hold."""
-    return lambda predictor: all(each(predictor) for each in wanted)
+def top(predictor: Predictor) -> float:
+    """Return the largest value of the image."""
+    values = predictor.seen.values
+    return float(values[np.isfinite(values)].max())

@@ -7,7 +7,7 @@ fault back from a whole image, without any path of light.
 
 from dataclasses import replace
 
-from validation.engine.fault import Fault, shows_both
+from validation.engine.fault import Fault, traits
 from validation.engine.image_faults import BRIGHTNESS, CAMERA, VALUES
 from validation.engine.layer_faults import FOG_AND_SURFACES, factor_fault, scaled
 from validation.engine.light_faults import LIGHTS
@@ -44,7 +44,8 @@ def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
     own = []
     for which, numbers in groups.items():
         words = f"{which} {'is' if which.startswith('the') else 'are'} {{0:.4g}} times as bright as they should be"
-        own.append(factor_fault("light-factor", words, scaled("intensity", numbers), lambda _: True))
+        own.append(factor_fault("light-factor", words, scaled("intensity", numbers)))
         words = f"the fog of {which} is {{0:.4g}} times as bright as it should be"
-        own.append(factor_fault("fog-factor", words, scaled("airlight", numbers), shows_both))
-    return tuple(fault for fault in (*FAULTS, *own) if fault.applies(predictor))
+        own.append(factor_fault("fog-factor", words, scaled("airlight", numbers), ("both",)))
+    there = traits(predictor)
+    return tuple(fault for fault in (*FAULTS, *own) if all(there[need] for need in fault.needs))

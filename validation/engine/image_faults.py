@@ -8,7 +8,7 @@ from itertools import permutations, product
 import numpy as np
 
 from validation.engine.curves import TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_srgb
-from validation.engine.fault import Array, Change, Fault, Parameter, Values, changed_values, scenery_number, undone
+from validation.engine.fault import Array, Change, Fault, Parameter, Values, changed_values, scenery_number, top, undone
 from validation.engine.prediction import Guess, Predictor
 
 
@@ -58,13 +58,13 @@ CAMERA = (
         "flip",
         "rows and columns are interchanged",
         undone(lambda image: image.transpose(1, 0, 2)),
-        applies=lambda predictor: predictor.shape[0] == predictor.shape[1],
+        needs=("square",),
     ),
     Fault(
         "fov-axis",
         "the field of view is that of the other axis",
         _other_axis,
-        applies=lambda predictor: predictor.shape[0] != predictor.shape[1],
+        needs=("oblong",),
     ),
     Fault(
         "fov",
@@ -104,19 +104,9 @@ def _ratio(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     return [(float(np.median(shown[lit] / predicted[lit])) if lit.any() else 1.0,)]
 
 
-def _top(predictor: Predictor) -> float:
-    values = predictor.seen.values
-    return float(values[np.isfinite(values)].max())
-
-
 def _clamp(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-    top = _top(predictor)
-    return replace(guess, values=(*guess.values, lambda radiance: np.minimum(radiance, top)))
-
-
-def _stops(predictor: Predictor) -> bool:
-    """Return whether many values stop at the largest one."""
-    return int(np.count_nonzero(predictor.seen.values == _top(predictor))) >= 8 and _top(predictor) > 0
+    most = top(predictor)
+    return replace(guess, values=(*guess.values, lambda radiance: np.minimum(radiance, most)))
 
 
 def _darkest(predictor: Predictor, guess: Guess) -> Sequence[Values]:
@@ -126,15 +116,12 @@ def _darkest(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     return [(max(float(np.median(more)), 1e-6 * float(np.abs(shown).mean()), 1e-30),)]
 
 
-def _coloured(predictor: Predictor) -> bool:
-    values = predictor.seen.values
-    return bool(np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values)))
-
-
 def _swapped(order: tuple[int, ...]) -> Fault:
     words = f"the image is in the channel order {', '.join('RGB'[channel] for channel in order)}"
     undo = (lambda image: image[..., order]) if order == (2, 1, 0) else None  # which undoes itself
-    return Fault("channels", words, changed_values(lambda radiance: radiance[..., order]), applies=_coloured, undo=undo)
+    return Fault(
+        "channels", words, changed_values(lambda radiance: radiance[..., order]), needs=("colours",), undo=undo
+    )
 
 
 BRIGHTNESS = Fault(
@@ -160,7 +147,7 @@ VALUES = (
         changed_values(gamma),
         (Parameter(0.2, 5.0, (0.4545, 1.8, 2.2, 2.4), logarithmic=True),),
     ),
-    Fault("clamp", "the values are cut off at the largest one: write floats", _clamp, applies=_stops),
+    Fault("clamp", "the values are cut off at the largest one: write floats", _clamp, needs=("stop",)),
     *(
         Fault("tone-map", f"the values went through {words}", changed_values(curve))
         for words, curve in TONE_CURVES.items()

@@ -13,15 +13,10 @@ from validation.engine.fault import (
     Fault,
     Parameter,
     Values,
-    all_of,
     changed_layers,
-    has_near_lights,
-    has_shapes,
     of_fog_alone,
     of_surfaces_alone,
     scenery_number,
-    shows_both,
-    shows_fog,
 )
 from validation.engine.image_faults import SHIFT, best_corner, shifted
 from validation.engine.light_faults import PLACE, at_position, position_held
@@ -60,10 +55,10 @@ def _weighted_median(values: Array, weights: Array) -> float:
     return float(values[order][min(int(np.searchsorted(heavier, 0.5 * heavier[-1])), len(order) - 1)])
 
 
-def factor_fault(name: str, words: str, change: Change, applies: Callable[[Predictor], bool]) -> Fault:
+def factor_fault(name: str, words: str, change: Change, needs: tuple[str, ...] = ()) -> Fault:
     """Return a fault that multiplies a part of the light."""
     one = (Parameter(1e-9, 1e9, logarithmic=True),)
-    return Fault(name, words, change, one, begin=_times(change), applies=applies, factor=True, kind="layers")
+    return Fault(name, words, change, one, begin=_times(change), needs=needs, factor=True, kind="layers")
 
 
 def _opacity(change: Callable[[Array, Array, Array], tuple[Array, Array]]) -> Change:
@@ -97,40 +92,40 @@ FOG_AND_SURFACES = (
         "fog-factor",
         "the fog is {0:.4g} times as bright as it should be, surfaces are right",
         scaled("airlight"),
-        shows_both,
+        ("both",),
     ),
     factor_fault(
         "surface-factor",
         "surfaces are {0:.4g} times as bright as they should be, the fog is right",
         scaled("surface"),
-        shows_both,
+        ("both",),
     ),
     *(
-        Fault("opacity", words, _opacity(change), applies=applies)
-        for words, applies, change in (
+        Fault("opacity", words, _opacity(change), needs=needs)
+        for words, needs, change in (
             (
                 "the fog is multiplied by its opacity once more: it was blended as a colour, or premultiplied twice",
-                shows_fog,
+                ("fog",),
                 lambda airlight, surface, left: (airlight * (1 - left), surface),
             ),
             (
                 "the fog is divided by its opacity: it was not premultiplied, and is taken as if it were",
-                shows_fog,
+                ("fog",),
                 lambda airlight, surface, left: (airlight / np.maximum(1 - left, 1e-6), surface),
             ),
             (
                 "the fog is multiplied by the transmittance of the whole ray: it is attenuated once more",
-                shows_both,
+                ("both",),
                 lambda airlight, surface, left: (airlight * left, surface),
             ),
             (
                 "surfaces are attenuated on the way to the camera twice",
-                has_shapes,
+                ("shapes",),
                 lambda airlight, surface, left: (airlight, surface * left),
             ),
             (
                 "fog and surfaces are mixed by the fog's opacity: both are attenuated once more",
-                shows_both,
+                ("both",),
                 lambda airlight, surface, left: (airlight * (1 - left), surface * left),
             ),
         )
@@ -143,7 +138,7 @@ FOG_AND_SURFACES = (
         begin=_ambient_colour,
         solved=True,
         single=True,
-        applies=shows_fog,
+        needs=("fog",),
     ),
     Fault(
         "fog-shift",
@@ -153,7 +148,7 @@ FOG_AND_SURFACES = (
         begin=best_corner(of_fog_alone(shifted)),
         costly=1,
         single=True,
-        applies=shows_both,
+        needs=("both",),
     ),
     Fault(
         "fog-shift",
@@ -162,7 +157,7 @@ FOG_AND_SURFACES = (
         (Parameter(0.2, 5.0, (0.95, 1.05), logarithmic=True, step=0.01),),
         costly=1,
         single=True,
-        applies=shows_both,
+        needs=("both",),
     ),
     *(
         Fault(
@@ -173,7 +168,7 @@ FOG_AND_SURFACES = (
             held=held,
             costly=1,
             single=True,
-            applies=all_of(shows_both, has_near_lights),
+            needs=("both", "lamps"),
         )
         for words, alone, held in (
             ("the fog, not for surfaces", of_fog_alone, _fog_held),

@@ -12,15 +12,10 @@ from validation.engine.fault import (
     Fault,
     Parameter,
     Values,
-    has_near_lights,
-    has_shapes,
-    has_soft_spots,
-    has_spots,
     of_fog_alone,
     of_surfaces_alone,
     scenery_number,
     short,
-    shows_both,
     with_law,
     with_scenery,
 )
@@ -62,21 +57,21 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
 PLACE = tuple(Parameter(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))
 
 LIGHTS = (
-    Fault("no-shadow", "nothing casts a shadow", with_scenery(shadows=False), applies=has_shapes),
+    Fault("no-shadow", "nothing casts a shadow", with_scenery(shadows=False), needs=("shapes",)),
     Fault(
         "no-shadow",
         "nothing casts a shadow in the fog, on surfaces it does",
         of_fog_alone(with_scenery(shadows=False)),
-        applies=shows_both,
+        needs=("both",),
     ),
     Fault(
         "no-shadow",
         "nothing casts a shadow on surfaces, in the fog it does",
         of_surfaces_alone(with_scenery(shadows=False)),
-        applies=shows_both,
+        needs=("both",),
     ),
     *(
-        Fault("distance-law", words, with_law(distance_power=power), applies=has_near_lights)
+        Fault("distance-law", words, with_law(distance_power=power), needs=("lamps",))
         for words, power in (
             ("the light falls as one over the distance, not over its square", 1.0),
             ("the light does not fall with the distance", 0.0),
@@ -89,7 +84,7 @@ LIGHTS = (
             _window(change),
             (Parameter(1e-3, 1e6, logarithmic=True),),
             begin=_ranges,
-            applies=has_near_lights,
+            needs=("lamps",),
         )
         for words, change in (
             ("they fall off by (1 - (r/R)^4)^2 with R =", lambda s: (1 - s**4) ** 2),
@@ -100,7 +95,7 @@ LIGHTS = (
         )
     ),
     *(
-        Fault("spot-angle", words, with_scenery(cone=factor), applies=has_spots)
+        Fault("spot-angle", words, with_scenery(cone=factor), needs=("spots",))
         for words, factor in (
             ("the angles of spots are twice what they should be: a half angle was taken for a whole one", 2.0),
             ("the angles of spots are half of what they should be: a whole angle was taken for a half one", 0.5),
@@ -112,14 +107,14 @@ LIGHTS = (
         scenery_number("cone"),
         (Parameter(0.2, 4.0, (0.8, 1.25), logarithmic=True, step=0.02),),
         costly=1,
-        applies=has_spots,
+        needs=("spots",),
     ),
-    Fault("spot-falloff", "spots have a hard edge, without falloff", with_scenery(edge="hard"), applies=has_soft_spots),
+    Fault("spot-falloff", "spots have a hard edge, without falloff", with_scenery(edge="hard"), needs=("soft spots",)),
     Fault(
         "spot-falloff",
         "spots fall off from their axis on, not from the beam's edge",
         with_scenery(edge="smooth"),
-        applies=has_spots,
+        needs=("spots",),
     ),
     Fault(
         "spot-falloff",
@@ -127,7 +122,7 @@ LIGHTS = (
         scenery_number("blend"),
         (Parameter(0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
         costly=1,
-        applies=has_spots,
+        needs=("spots",),
     ),
     Fault(
         "light-radius",
@@ -135,7 +130,7 @@ LIGHTS = (
         scenery_number("radius"),
         (Parameter(0.0, 10.0, (0.05, 0.2, 0.5), step=0.01),),
         costly=2,
-        applies=lambda predictor: any(light.axis is None for light in predictor.truth.lights),
+        needs=("point lights",),
     ),
     Fault(
         "light-position",
@@ -144,6 +139,6 @@ LIGHTS = (
         PLACE,
         held=position_held,
         costly=1,
-        applies=has_near_lights,
+        needs=("lamps",),
     ),
 )

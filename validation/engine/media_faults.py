@@ -18,19 +18,9 @@ from validation.engine.fault import (
     Fault,
     Parameter,
     Values,
-    absorbs,
-    all_of,
     changed_fog,
     changed_layers,
-    fog_surrounds,
-    has_lobe,
-    has_near_lights,
-    has_no_lobe,
-    has_shapes,
-    in_height_fog,
     short,
-    shows_both,
-    shows_fog,
     with_law,
 )
 from validation.engine.prediction import Guess, Layers, Predictor
@@ -189,18 +179,12 @@ def _multiple(of_surfaces: bool) -> Change:
     return changed_layers(make)
 
 
-def _brighter(predictor: Predictor) -> bool:
-    """Return whether an image has more light than it should: higher orders take none away."""
-    guess = Guess(predictor.fog)
-    return float(np.median(predictor.shown(guess) - predictor.predicted(guess))) > 0
-
-
 MEDIUM = (
     Fault(
         "extinction",
         "the extinction is one over what it should be: a mean free path was asked for",
         _optics(lambda sigma_t, albedo: (1 / sigma_t, albedo)),
-        applies=lambda predictor: not in_height_fog(predictor),
+        needs=("even fog",),
     ),
     Fault(
         "extinction",
@@ -213,22 +197,22 @@ MEDIUM = (
         "the absorption is {0:.4g} times what it should be, at the same scattering",
         _optics(_absorption),
         (Parameter(0.0, 50.0, (0.0, 0.5, 2.0, 5.0)),),
-        applies=absorbs,
+        needs=("absorption",),
     ),
     Fault(
         "absorption",
         "the medium does not absorb: extinction is only what is scattered",
         _optics(_absorption),
-        applies=absorbs,
+        needs=("absorption",),
     ),
     Fault(
         "sigma-s",
         "the extinction was taken for the scattering coefficient, and absorption came on top",
         _optics(lambda sigma_t, albedo: (sigma_t / albedo if albedo > 0 else sigma_t, albedo)),
-        applies=absorbs,
+        needs=("absorption",),
     ),
     *(
-        Fault("albedo", f"the albedo was {words}", _optics(change), applies=absorbs)
+        Fault("albedo", f"the albedo was {words}", _optics(change), needs=("absorption",))
         for words, change in (
             ("applied twice", lambda sigma_t, albedo: (sigma_t, albedo**2)),
             ("left out", lambda sigma_t, albedo: (sigma_t, 1.0)),
@@ -243,24 +227,24 @@ MEDIUM = (
         "g-sign",
         "g of the phase function has the other sign: light that should go on comes back",
         _lobes(lambda g: -g),
-        applies=lambda predictor: has_lobe(predictor) and any(predictor.fog.phase),
+        needs=("g",),
     ),
     Fault(
         "g",
         "g of the phase function is {0:.4g}",
         lambda predictor, guess, p: _lobes(lambda g: float(p[0]))(predictor, guess, ()),
         (Parameter(-0.99, 0.99, (-0.5, 0.0, 0.4, 0.8)),),
-        applies=has_lobe,
+        needs=("lobes",),
     ),
     Fault(
         "g",
         "the phase function is Henyey and Greenstein's with g {0:.4g}, not isotropic",
         lambda predictor, guess, p: _every_phase(float(p[0]))(predictor, guess, ()),
         (Parameter(-0.99, 0.99, (-0.5, 0.4, 0.8)),),
-        applies=has_no_lobe,
+        needs=("fog", "isotropy"),
     ),
     *(
-        Fault("phase", f"the phase function is {words}", change, applies=has_lobe)
+        Fault("phase", f"the phase function is {words}", change, needs=("lobes",))
         for words, change in (
             ("isotropic", _lobes(lambda g: 0.0)),
             ("Schlick's, with k = 1.55 g - 0.55 g^3", _lobes(lambda g: _schlick(1.55 * g - 0.55 * g**3))),
@@ -268,8 +252,8 @@ MEDIUM = (
             ("Cornette and Shanks's, with the same g", _lobes(_cornette_shanks)),
         )
     ),
-    Fault("phase", "the phase function is Rayleigh's", _every_phase(_rayleigh), applies=shows_fog),
-    Fault("phase", "a cosine was taken for the phase function", _every_phase(_cosine), applies=shows_fog),
+    Fault("phase", "the phase function is Rayleigh's", _every_phase(_rayleigh), needs=("fog",)),
+    Fault("phase", "a cosine was taken for the phase function", _every_phase(_cosine), needs=("fog",)),
     *(
         Fault(name, f"the way {words} is not attenuated", with_law(**{name.replace("-", "_"): (0.0, 0.0)}))
         for name, words in (("light-leg", "from the light"), ("camera-leg", "to the camera"))
@@ -279,7 +263,7 @@ MEDIUM = (
             name,
             f"the way {words} is not attenuated for {which}",
             with_law(**{name.replace("-", "_"): legs}),
-            applies=shows_both,
+            needs=("both",),
         )
         for name, words in (("light-leg", "from the light"), ("camera-leg", "to the camera"))
         for which, legs in (("the fog, for surfaces it is", (0.0, 1.0)), ("surfaces, for the fog it is", (1.0, 0.0)))
@@ -289,7 +273,7 @@ MEDIUM = (
         "lengths are {0:.4g} times what they should be: another unit of length",
         _unit,
         (Parameter(1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), logarithmic=True),),
-        applies=has_near_lights,
+        needs=("lamps",),
     ),
     # Where the fog before it is dark, a near plane is a factor with all digits of one that engines have.
     *(
@@ -297,7 +281,7 @@ MEDIUM = (
             "near-plane",
             f"the medium is missing up to {distance:g} m before the camera: a usual near plane",
             _between(False, "near", at=distance),
-            applies=fog_surrounds,
+            needs=("no bounds",),
         )
         for distance in _USUAL_NEAR
     ),
@@ -306,7 +290,7 @@ MEDIUM = (
         "the medium is missing up to {0:.4g} m before the camera: its near plane",
         _between(False, "near"),
         (Parameter(0.0, np.inf, (0.05, 0.2, 0.5, 1.0)),),
-        applies=fog_surrounds,
+        needs=("no bounds",),
     ),
     *(
         Fault(
@@ -316,7 +300,7 @@ MEDIUM = (
             (Parameter(1e-3, np.inf, logarithmic=True),),
             begin=_depths,
             costly=1,
-            applies=all_of(fog_surrounds, shows_fog),
+            needs=("no bounds", "fog"),
         )
         for words, spherical in (("before the camera, at a plane", False), ("away from the camera", True))
     ),
@@ -325,17 +309,17 @@ MEDIUM = (
             "depth-axis",
             f"distances along the axis of the camera were taken for distances along the ray {where}",
             change,
-            applies=applies,
+            needs=needs,
         )
-        for where, change, applies in (
-            ("in the attenuation and where rays end", _depth_for_distance("surfaces", march=True), shows_fog),
-            ("in the attenuation", _depth_for_distance("nodes", "surfaces"), has_shapes),
+        for where, change, needs in (
+            ("in the attenuation and where rays end", _depth_for_distance("surfaces", march=True), ("fog",)),
+            ("in the attenuation", _depth_for_distance("nodes", "surfaces"), ("shapes",)),
             (
                 "in the attenuation and the steps of the march",
                 _depth_for_distance("nodes", "surfaces", "steps"),
-                shows_fog,
+                ("fog",),
             ),
-            ("in the attenuation of surfaces", _depth_for_distance("surfaces"), shows_both),
+            ("in the attenuation of surfaces", _depth_for_distance("surfaces"), ("both",)),
         )
     ),
     Fault(
@@ -345,7 +329,7 @@ MEDIUM = (
         (Parameter(1e-2, 1e4, logarithmic=True), Parameter(1e-2, 1e2, logarithmic=True)),
         begin=_heights,
         single=True,
-        applies=lambda predictor: fog_surrounds(predictor) and not in_height_fog(predictor),
+        needs=("no bounds", "even fog"),
     ),
     Fault(
         "homogeneous",
@@ -354,10 +338,10 @@ MEDIUM = (
         (Parameter(1e-5, 1e3, logarithmic=True),),
         begin=_densities,
         single=True,
-        applies=in_height_fog,
+        needs=("height fog",),
     ),
     *(
-        Fault("scale-height", words, _stretched(factor), applies=in_height_fog)
+        Fault("scale-height", words, _stretched(factor), needs=("height fog",))
         for words, factor in (
             ("scale heights are one over what they should be: a falloff was asked for", lambda h: 1 / h),
             ("densities halve in what should be the scale height", lambda h: h / math.log(2)),
@@ -372,14 +356,14 @@ MEDIUM = (
         "scale heights are {0:.4g} times what they should be",
         _stretched(lambda h, factor: h * factor),
         (Parameter(1e-3, 1e3, _FACTOR, logarithmic=True),),
-        applies=in_height_fog,
+        needs=("height fog",),
     ),
     Fault(
         "base-height",
         "bases of layers are {0:+.4g} m higher than they should be",
         _layers(lambda layer, shift: replace(layer, base=layer.base + shift)),
         (_SHIFT,),
-        applies=in_height_fog,
+        needs=("height fog",),
     ),
     Fault(
         "height-fog",
@@ -388,7 +372,7 @@ MEDIUM = (
         (Parameter(1e-3, 1e3, logarithmic=True), _SHIFT),
         begin=lambda predictor, guess: [(factor, shift) for factor in (0.5, 1.0, 2.0) for shift in (-1.0, 0.0, 1.0)],
         single=True,
-        applies=in_height_fog,
+        needs=("height fog",),
     ),
     Fault(
         "multiple",
@@ -396,7 +380,7 @@ MEDIUM = (
         _multiple(of_surfaces=False),
         (Parameter(0.0, 3.0),),
         costly=1,
-        applies=all_of(shows_fog, _brighter),
+        needs=("fog", "more light"),
     ),
     Fault(
         "multiple",
@@ -404,6 +388,6 @@ MEDIUM = (
         _multiple(of_surfaces=True),
         (Parameter(0.0, 3.0),),
         costly=1,
-        applies=all_of(lambda predictor: predictor.seen.holds == "total", _brighter),
+        needs=("all light", "more light"),
     ),
 )
