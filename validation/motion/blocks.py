@@ -108,6 +108,23 @@ def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
     return tuple(Estimate(float(value), float(error)) for value, error in zip(found, errors, strict=True))
 
 
+def parts_of_error(products: Array) -> tuple[Estimate, Estimate]:
+    """Return squared bias and variance from the mean products of errors of pairs of runs."""
+    count = len(products)
+
+    def parts(total: Array, own: Array, runs: int) -> Array:
+        return np.stack([(total - own) / (runs * (runs - 1)), (own - total / runs) / (runs - 1)], axis=-1)
+
+    total, own = products.sum(), np.trace(products)
+    found = parts(total, own, count)
+    if count < 3:
+        return Estimate(float(found[0])), Estimate(float(found[1]))
+    diagonal = np.diag(products)
+    left_out = parts(total - 2 * products.sum(axis=1) + diagonal, own - diagonal, count - 1)
+    told = estimates(found, left_out)
+    return told[0], told[1]
+
+
 def _told_apart(matrix: Array) -> bool:
     scale = np.sqrt(np.diag(matrix))
     return bool((scale > 0).all()) and bool(np.linalg.det(matrix / np.outer(scale, scale)) > _SINGULAR)

@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
-from scipy.stats import nct, t
+from scipy.stats import nct
 
 from analytic.errors import InputError
 from reference.storage.exr import read_exr
@@ -46,7 +46,8 @@ from validation.engine.judge import references, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import Progress, pixel_kinds, scene_of_size
 from validation.metrics.errors import plain
-from validation.motion.blocks import Estimate, estimates, told
+from validation.motion.blocks import Estimate, parts_of_error, told
+from validation.statistics.samples import student, student_quantile
 
 Array = NDArray[np.float64]
 
@@ -210,16 +211,9 @@ def _blurred(errors: Array, deviation: float) -> Array:
     return np.array([gaussian_filter(each, (deviation, deviation, 0), mode="wrap") for each in errors])
 
 
-def student(values: Array) -> tuple[float, float]:
-    """Return the mean of the values of runs, and half of its interval of 95 % by Student."""
-    count = len(values)
-    error = float(values.std(ddof=1)) / math.sqrt(count)
-    return float(values.mean()), float(t.ppf(1 - _LEVEL / 2, count - 1)) * error
-
-
 def detectable(runs: int) -> float:
     """Return the bias, in deviations of one run, that a test of Student at 5 % finds nine times of ten."""
-    limit = float(t.ppf(1 - _LEVEL / 2, runs - 1))
+    limit = student_quantile(1 - _LEVEL / 2, runs - 1)
     root = math.sqrt(runs)
 
     def lacking(bias: float) -> float:
@@ -227,23 +221,6 @@ def detectable(runs: int) -> float:
         return (1.0 if math.isnan(found) else found) - _POWER
 
     return float(brentq(lacking, 0.0, 10 * limit / root))
-
-
-def parts_of_error(products: Array) -> tuple[Estimate, Estimate]:
-    """Return squared bias and variance from the mean products of errors of pairs of runs."""
-    count = len(products)
-
-    def parts(total: Array, own: Array, runs: int) -> Array:
-        return np.stack([(total - own) / (runs * (runs - 1)), (own - total / runs) / (runs - 1)], axis=-1)
-
-    total, own = products.sum(), np.trace(products)
-    found = parts(total, own, count)
-    if count < 3:
-        return Estimate(float(found[0])), Estimate(float(found[1]))
-    diagonal = np.diag(products)
-    left_out = parts(total - 2 * products.sum(axis=1) + diagonal, own - diagonal, count - 1)
-    told = estimates(found, left_out)
-    return told[0], told[1]
 
 
 def _spectrum(noise: Array) -> tuple[tuple[float, ...], float]:

@@ -48,6 +48,12 @@ def student_quantile(probability: float, freedom: float) -> float:
     return float(stdtrit(freedom, probability) if np.isfinite(freedom) else ndtri(probability))
 
 
+def student(values: Array) -> tuple[float, float]:
+    """Return the mean of independent values, (n,), and half of its interval of 95 % by Student."""
+    error = float(values.std(ddof=1)) / np.sqrt(len(values))
+    return float(values.mean()), student_quantile(0.5 + LEVEL / 2, len(values) - 1) * float(error)
+
+
 def sidak(level: float, tests: int) -> float:
     """Return the level [1] of each of m independent `tests` of which none rejects with probability 1 - `level`.
 

@@ -32,7 +32,8 @@ from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
-from validation.motion.noise import parts_of_error, student
+from validation.motion.blocks import parts_of_error
+from validation.statistics.samples import student
 from validation.study.configuration import Configuration, prepared, rendered_lights
 from validation.study.frame_times import brief_times, camera_rays, shader_times, time_frame
 from validation.study.reference import Reference, load_cell

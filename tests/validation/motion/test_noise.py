@@ -10,8 +10,10 @@ import pytest
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from validation.estimates.quadrature import reference_image
-from validation.motion.noise import Noise, compare_runs, detectable, measure_noise, parts_of_error, student
+from validation.motion.blocks import parts_of_error
+from validation.motion.noise import Noise, compare_runs, detectable, measure_noise
 from validation.scenes.loading import load_scene
+from validation.statistics.samples import student
 
 REFERENCE = np.linspace(0.5, 1.5, 24 * 32 * 3).reshape(24, 32, 3)
 SIGMA = 0.2
