@@ -72,14 +72,14 @@ def regression(sums: Array) -> tuple[Estimate, ...]:
     return estimates(found, np.linalg.solve(left[:, :-1, :-1], left[:, :-1, -1:])[..., 0])
 
 
-def relative_root(sums: Array, value: int, *, to: int, counted: int = 0, values: int = 0) -> Estimate:
+def relative_root(sums: Array, value: int, *, to: int, values: int = 0) -> Estimate:
     """Return the root mean square of a column, counted by column `values`, over the mean of another."""
     several = _left_out(sums)
     square = several[:, value, value] / np.maximum(several[:, values, values], 1e-300)
-    lower = several[:, counted, to]
+    lower = several[:, 0, to]
     if not (lower > 0).all():
         return UNKNOWN
-    found = np.sqrt(square) * several[:, counted, counted] / lower
+    found = np.sqrt(square) * several[:, 0, 0] / lower
     return estimates(found[:1], found[1:, None])[0]
 
 

@@ -69,17 +69,17 @@ class Pair:
         return [float(light / at) for at in (expected, expected + spread, expected - spread)]
 
 
-def clouds_figures(*, size: tuple[int, int] = SIZE, samples: int = SAMPLES) -> dict[str, Any]:
+def clouds_figures() -> dict[str, Any]:
     """Return light over that of the reference in Figs 11 and 12, and what shaded surfaces of Fig. 11a lack [%]."""
-    every = np.ones(size[::-1], dtype=bool)
-    figures: dict[str, Any] = {name: pair_of(shown(name, size), samples).ratio(every) for name in RESULTS}
-    fewer = max(2, samples // _FEWER)
-    loaded = shown(GAP, size)
-    pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(size[::-1])
+    every = np.ones(SIZE[::-1], dtype=bool)
+    figures: dict[str, Any] = {name: pair_of(shown(name, SIZE), SAMPLES).ratio(every) for name in RESULTS}
+    fewer = SAMPLES // _FEWER
+    loaded = shown(GAP, SIZE)
+    pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(SIZE[::-1])
     figures["gap, shaded"] = pair.ratio(shaded)
     part = 100 * float(pair.reference[shaded].sum() / pair.reference.sum())
     figures["gap, lost"] = [part * (1 - ratio) for ratio in (figures["gap, shaded"][place] for place in (0, 2, 1))]
-    loaded = shown(LOBES, size)
+    loaded = shown(LOBES, SIZE)
     two = _two_collectors(loaded)
     figures["lobes, two"] = pair_of(loaded, fewer).ratio(two) if two.any() else "no pixel has two collectors"
     return figures

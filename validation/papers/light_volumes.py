@@ -52,6 +52,7 @@ _BIAS_MAP, _BIAS_SIZE = 128, (64, 64)  # of omni-box
 _MAPS = (32, 128, 512)  # of Fig. 6 [texels]
 FACETS = {"few": 16, "many": 512}  #: of a ring of the sphere: 514 triangles, and half a million
 _TRIANGLE_SIZE = (512, 512)
+_SECONDS = 0.3  # for each timing [s]
 _HALVINGS = 24  # of the interval of the threshold
 
 
@@ -70,7 +71,7 @@ def _renderer(scene: Scene, evaluation: str, size: int) -> FrameRenderer:
     return methods.prepared(scene, chosen)
 
 
-def triangle_times(seconds: float = 0.3) -> dict[str, Any]:
+def triangle_times() -> dict[str, Any]:
     """Return the times of the volume and of a frame of shadow planes with few and with many triangles [ms]."""
     times: dict[str, Any] = {}
     for name, facets in FACETS.items():
@@ -81,7 +82,7 @@ def triangle_times(seconds: float = 0.3) -> dict[str, Any]:
         dr.eval(cast, by_light)
         planes = methods.prepared(scene, methods.configuration("shadow-planes", "exact"))
         works = [_evaluation(volumes, state, cast, by_light), moved_light(planes)]
-        volume, frame = time_in_turns(works, seconds=seconds * len(works))
+        volume, frame = time_in_turns(works, seconds=_SECONDS * len(works))
         times |= {f"volume, {name}": volume.interval, f"planes, {name}": frame.interval}
     return times
 
