@@ -30,17 +30,16 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.area_lights.points import LightPoints
-from realtime.errors import InputError, refusals
+from realtime.errors import InputError
 from realtime.frame.adaptive_sampling import Corners, adaptive_layers, tile_corners
 from realtime.frame.history import HistoryPass
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.sphere_lights import sampled_sphere, sphere_scales
 from realtime.frame.surface import Cast, surface_stages
-from realtime.kernels.table import prepare_kernel, with_tables
 from realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
 from realtime.numerics.array_types import PerRay, aligned_array
 from realtime.numerics.noise import Noise, blue_mask
-from realtime.numerics.recorded import Frozen
+from realtime.numerics.recorded import Frozen, prepare_kernel, refusals, with_tables
 from realtime.parameters import values
 from realtime.scene.camera import TILE, tiled_pixels
 from realtime.scene.light_points import with_light_points
@@ -170,7 +169,7 @@ def frame_renderer(
         tables=prepare_kernel(kernel, type(scene.camera.origin.x)) if chosen.uses_kernel else None,
         corners=None,
         extra_layers=extra_layers and not scene.area_lights,
-        sphere_scales=sphere_scales(scene, chosen, kernel),
+        sphere_scales=sphere_scales(scene, chosen, kernel) if "sphere" in scene.features.area_lights else None,
         history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x)) if chosen.history else None,
         mask=blue_mask() if chosen.noisy else None,
     )

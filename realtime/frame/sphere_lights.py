@@ -26,11 +26,10 @@ import mitsuba as mi
 
 from realtime.area_lights.points import LightPoints, place_points
 from realtime.area_lights.shape import AreaLight
-from realtime.kernels.table import with_tables
 from realtime.methods.interface.method import Method, View, camera_view
 from realtime.numerics.array_types import aligned_array, types_of
 from realtime.numerics.functions import summed
-from realtime.numerics.recorded import Frozen
+from realtime.numerics.recorded import Frozen, with_tables
 from realtime.scene.lights import Facing
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.read_scene import Scene
@@ -53,8 +52,7 @@ def sphere_scales(scene: Scene, method: Method, kernel: Any) -> Frozen | None:
 
     Valid for methods that render samples one by one with a kernel in a homogeneous medium without bounds.
     """
-    spheres = any(light.kind == "sphere" for light in scene.area_lights)
-    if not spheres or method.at_once or not method.uses_kernel or not isinstance(scene.medium, Homogeneous):
+    if method.at_once or not method.uses_kernel or not isinstance(scene.medium, Homogeneous):
         return None
     features = scene.features
 

@@ -36,7 +36,7 @@ fraction all terms that make Im w agree in sign, so Im S keeps its relative accu
 import drjit as dr
 
 from realtime.errors import InputError
-from realtime.kernels.quadrature import path_over_height
+from realtime.kernels.exact import path_over_height
 from realtime.numerics.array_types import is_single, smallest
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light

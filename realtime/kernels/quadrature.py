@@ -31,11 +31,11 @@ import drjit as dr
 import numpy as np
 
 from realtime.errors import InputError
-from realtime.numerics.array_types import is_single, smallest
+from realtime.kernels.exact import path_interval
 from realtime.numerics.functions import exp_bounded
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous, optical_reach
+from realtime.scene.media.medium import Homogeneous
 
 
 def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):
@@ -93,38 +93,6 @@ def _panel(geometry: RayGeometry, x0, x1, sigma_t, medium: Homogeneous, light: L
         nodes=positive_nodes(nodes),
     )
     return total * half * (2 / h) * dr.exp(-sigma_t * path)
-
-
-def path_interval(geometry: RayGeometry, x0, x1, sigma_t, *, tail=1.0):
-    """Return the height [m], E = q/h at both ends of [x0, x1] [m], and their difference without cancellation [1].
-
-    The far end is brought to where extinction or p/(1 + E^2) have left nothing behind it. `tail` is the E from which on
-    p/(1 + E^2) falls like 1/E^2: 1, or where a backward lobe ends. `sigma_t` is the extinction [1/m]. Valid for any
-    segment.
-    """
-    foot, h = geometry.foot, geometry.height
-    Float = type(h)
-    single = is_single(Float)
-    # J is even in h, so a height below rounding of the distances is as good as zero, and this one keeps E finite.
-    s0, s1 = x0 - foot, x1 - foot
-    h = dr.maximum(h, (1e-9 if single else 1e-17) * (dr.abs(s0) + smallest(Float)))
-    r0 = dr.sqrt(dr.fma(s0, s0, h * h))
-    e0 = path_over_height(s0, r0, h)
-    # Beyond the first term extinction has left e^-20 (e^-40); beyond the second, p/(1+E^2) has.
-    extinction = dr.maximum(sigma_t * h, smallest(Float))
-    reach = dr.minimum(optical_reach(Float) / extinction, (1e7 if single else 1e12) * (tail + e0))
-    s1 = dr.select(dr.isfinite(s1), s1, 0)
-    r1 = dr.sqrt(dr.fma(s1, s1, h * h))
-    e1 = path_over_height(s1, r1, h)
-    clipped = dr.isinf(x1) | (e1 > e0 + reach)
-    e1 = dr.select(clipped, e0 + reach, e1)
-    return h, e0, e1, dr.select(clipped, reach, (x1 - x0) * (e0 + e1) / (r0 + r1))
-
-
-def path_over_height(s, r, h):
-    """Return E = q/h from s = x - foot, r and the height, without cancellation."""
-    behind = s >= 0
-    return dr.select(behind, s + r, h) / dr.select(behind, h, r - s)
 
 
 def _pairs(geometry: RayGeometry, ray, panel, *, phase, light: Light, nodes):

@@ -1,12 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The published table of the airlight integral, and how the tables of a kernel come onto the device.
-
-Kernels that read tables: what must be on the device before a frame is recorded.
-
-A frozen function cannot take an array from the host, and reads one on the device only if it is among its inputs. So a
-kernel may have a `prepare`, ``prepare(Float, **parameters) -> tables``, which `prepared_by` gives it. Who freezes a
-function calls `prepare_kernel` before, passes what it returns as an input, and calls the kernel as `with_tables` makes
-it. A kernel without `prepare` knows nothing of this.
+"""The published table of the airlight integral.
 
 J as the difference of two reads. With E = q/h (path form of DESIGN section 2), a = sigma_t h and an isotropic phase
 function
@@ -27,9 +20,7 @@ Reads are bilinear, in software: the texture units of graphics hardware have 8-b
 corners of each cell side by side, one fetch a read.
 """
 
-from collections.abc import Callable
-from functools import lru_cache, partial
-from typing import Any
+from functools import lru_cache
 
 import drjit as dr
 import numpy as np
@@ -37,36 +28,10 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import four_numbers
 from realtime.numerics.functions import cell_of
+from realtime.numerics.recorded import prepared_by
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
-
-
-def prepared_by(prepare: Callable[..., Any]) -> Callable[[Any], Any]:
-    """Return a decorator that gives a kernel its `prepare`; the kernel takes the tables as its keyword `tables`."""
-
-    def mark(kernel: Any) -> Any:
-        kernel.prepare = prepare
-        return kernel
-
-    return mark
-
-
-def prepare_kernel(kernel: Any, Float: type) -> Any:
-    """Return the tables of a kernel, evaluated, in the precision of `Float`; None for one that reads none.
-
-    `kernel`: a kernel function, or a `functools.partial` of one that sets parameters; `Float`: the type of a number per
-    ray. Raises InputError for what the kernel's `prepare` refuses.
-    """
-    function, parameters = (kernel.func, kernel.keywords) if isinstance(kernel, partial) else (kernel, {})
-    prepare = getattr(function, "prepare", None)
-    return None if prepare is None else prepare(Float, **parameters)
-
-
-def with_tables(kernel: Any, tables: Any) -> Any:
-    """Return the kernel that reads these tables, from `prepare_kernel`."""
-    return kernel if tables is None else partial(kernel, tables=tables)
-
 
 _LARGEST_U = 10.0  # of Sun's table
 _LARGEST_SIZE = 2048  # 128 MiB in float32 on the device; the quadratures below are good to this size
@@ -83,7 +48,7 @@ def upload_table(Float, *, size: int = 64):
     if dr.flag(dr.JitFlag.FreezingScope):
         raise InputError(
             "kernel table: got a frozen function that records while the table is not on the device; call "
-            "realtime.kernels.table.prepare_kernel before, and pass on what it returns"
+            "realtime.numerics.recorded.prepare_kernel before, and pass on what it returns"
         )
     records = Float(table_records(size).ravel())
     dr.make_opaque(records)

@@ -13,7 +13,6 @@ Read in this order:
 - `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;
 - `triangle_table.py`: what shading needs of every triangle;
 - `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;
-- `features.py`: what the scene needs of a method;
 - `read_media.py`: reads the media of a Mitsuba scene;
 - `read_scene.py`: reads a Mitsuba scene;
 - `light_points.py`: lights with extent as light points;

@@ -16,6 +16,7 @@ a ray have float64, in which `realtime.rays` computes once where it passes a lig
 of the scene.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,7 +24,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.array_types import host_numbers
+from realtime.errors import InputError
+from realtime.numerics.array_types import ArrayTypes, host_numbers
 
 TILE = 16  #: rays in a tile of neighbouring pixels
 SIDE = 4  #: of a tile [pixels]
@@ -98,6 +100,33 @@ def pixel_grid(width: int, height: int) -> PixelGrid:
     grid = PixelGrid(mi.UInt32(width), mi.Float64(1 / width), *halves)
     dr.make_opaque(grid)
     return grid
+
+
+def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
+    """Return the camera of a Mitsuba scene, and the sensor of which it was read.
+
+    Raises InputError for one that is no pinhole camera in the middle of its film.
+    """
+    sensors = scene.sensors()
+    if not sensors:
+        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
+    sensor = sensors[0]
+    if sensor.class_name() != "PerspectiveCamera":
+        raise InputError(f"the scene's sensor is a {sensor.class_name()}; wanted a sensor of type 'perspective'")
+    parameters = mi.traverse(sensor)
+    width, height = (int(n) for n in parameters["film.size"])
+    if list(parameters["film.crop_size"]) != [width, height]:
+        raise InputError("the camera's film is cropped; remove crop_width, crop_height and crop_offset from the film")
+    if any(float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"):
+        raise InputError("the camera has a principal point offset; remove principal_point_offset_x and _y")
+    matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
+    pixel = 2 * tangent / width
+    basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel
+    forward, left, up = (mi.Vector3d(*(float(c) for c in column)) for column in basis)
+    origin = types.vector(*(float(c) for c in matrix[:3, 3]))
+    dr.make_opaque(origin, forward, left, up)
+    return Camera(width, height, origin, (forward, left, up), pixel_grid(width, height)), sensor
 
 
 def row_and_column(camera: Camera, pixel):

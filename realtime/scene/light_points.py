@@ -39,12 +39,6 @@ def light_points(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
     return tuple(point for number, of_light in enumerate(placed) for point in _points_of(of_light, number, types))
 
 
-def source_shape(scene: Scene, light: Light) -> str | None:
-    """Return the name of the shape of a light point that casts no shadow in it; None otherwise."""
-    area = None if light.source is None else scene.area_lights[light.source]
-    return None if area is None or area.folded else area.name
-
-
 @dataclass(frozen=True)
 class LightFrame:
     """A light point, or one of several in each lane, and the orthonormal frame of its normal."""

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading a Mitsuba scene: the camera, the medium, the lights, and what of them asks for code of its own.
 
-Mitsuba's own scene is the scene; nothing of ours is needed in it. What no method can do yet is refused by name.
+Mitsuba's own scene is the scene; nothing of ours is needed in it. What no method can do yet is refused by name. A frame
+runs the code that the features of a scene ask for, no other (DESIGN section 5).
 """
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 from realtime.area_lights.shape import AreaLight, is_area_light, read_area_light
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, types_of
-from realtime.scene.camera import Camera, pixel_grid
+from realtime.scene.camera import Camera, sensor_camera
 from realtime.scene.closed_mesh import ClosedMesh
 from realtime.scene.directional_extent import (
     directional_fields,
@@ -26,7 +28,6 @@ from realtime.scene.directional_extent import (
     mesh_spheres,
     shape_spheres,
 )
-from realtime.scene.features import SceneFeatures, backgrounds, scene_notes
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.media.density_grid import GridMedium
 from realtime.scene.media.height_fog import HeightFog
@@ -35,6 +36,30 @@ from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from realtime.scene.triangle_table import Facets, read_facets
 
 _UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that counts as upright in the image
+
+
+@dataclass(frozen=True)
+class SceneFeatures:
+    """What a scene needs; every field chooses which code runs, and none is data."""
+
+    shadows: bool  #: there is something that can cast a shadow
+    surfaces: bool  #: there is something that the camera can see
+    extinctions: int  #: 1 for a grey medium, 3 for a coloured one
+    isotropic: bool  #: the phase function is a constant
+    bounded: bool  #: the medium ends somewhere
+    vacuum: bool  #: nothing is extinguished in at least one channel
+    point_lights: int
+    spot_lights: int
+    soft_spots: bool  #: a spot's intensity falls off inside its cone
+    directional_lights: int = 0
+    area_lights: tuple[str, ...] = ()  #: the shapes of lights with extent: 'rectangle', 'disk', 'sphere' or 'mesh'
+    clear: bool = False  #: bounded: nothing fills the space between the media
+    concave: tuple[str, ...] = ()  #: shapes that bound media and are not all convex: clouds
+    uneven: int = 0  #: clouds whose density differs from place to place
+    sky: str = ""  #: the axis from which a uniform sky shines, '' where there is none; it is seen behind the scene
+    height_fog: bool = False  #: the density of the medium depends on height
+    grid: bool = False  #: the density of the medium is a grid
+    notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
 @dataclass(frozen=True)
@@ -51,6 +76,11 @@ class Scene:
     area_lights: tuple[AreaLight, ...] = ()  #: those with extent, of which methods render points
     sky: Any = None  #: radiance of a uniform sky behind fog, RGB [W/(m^2 sr)]: closed forms of shading show its light
     boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
+
+    def source_shape(self, light: Light) -> str | None:
+        """Return the name of the shape of a light point that casts no shadow in it; None otherwise."""
+        area = None if light.source is None else self.area_lights[light.source]
+        return None if area is None or area.folded else area.name
 
 
 def read_scene(scene, precision: str = "single") -> Scene:
@@ -95,7 +125,7 @@ def read_again(known: Scene, scene) -> Scene:
 
 def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
     """Return the fields of a `Scene` but for its shapes, and the opaque shapes."""
-    camera, sensor = _read_camera(scene, types)
+    camera, sensor = sensor_camera(scene, types)
     opaque, boundaries = sort_shapes(scene)
     medium, meshes = read_medium(sensor, boundaries, types)
     if not scene.emitters():
@@ -142,29 +172,6 @@ class _Bodies:
         else:
             spheres = mesh_spheres(self.meshes) if self.meshes else media_spheres(self.medium.bounded_media)
         return directional_fields(axis, spheres, distance_before(spheres, self.opaque), types)
-
-
-def _read_camera(scene, types: ArrayTypes):
-    sensors = scene.sensors()
-    if not sensors:
-        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
-    sensor = sensors[0]
-    if sensor.class_name() != "PerspectiveCamera":
-        raise InputError(f"the scene's sensor is a {sensor.class_name()}; wanted a sensor of type 'perspective'")
-    parameters = mi.traverse(sensor)
-    width, height = (int(n) for n in parameters["film.size"])
-    if list(parameters["film.crop_size"]) != [width, height]:
-        raise InputError("the camera's film is cropped; remove crop_width, crop_height and crop_offset from the film")
-    if any(float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"):
-        raise InputError("the camera has a principal point offset; remove principal_point_offset_x and _y")
-    matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
-    tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
-    pixel = 2 * tangent / width
-    basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel
-    forward, left, up = (mi.Vector3d(*(float(c) for c in column)) for column in basis)
-    origin = types.vector(*(float(c) for c in matrix[:3, 3]))
-    dr.make_opaque(origin, forward, left, up)
-    return Camera(width, height, origin, (forward, left, up), pixel_grid(width, height)), sensor
 
 
 def _read_light(emitter, types: ArrayTypes) -> Light:
@@ -333,3 +340,63 @@ def _axis_name(light: Light) -> str:
     from_there = -np.array(light.exact_axis).ravel()
     number = int(np.argmax(np.abs(from_there)))
     return ("-" if from_there[number] < 0 else "") + "xyz"[number]
+
+
+def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
+    """Return what is seen behind a scene that lights in it light: an environment, or a sky that is no light of clouds.
+
+    A constant emitter beside directional lights alone lights clouds (`_read_sky`), if there may be any.
+    """
+    around = {"EnvironmentMapEmitter", "ConstantBackgroundEmitter"}
+    lights = {emitter.class_name() for emitter in scene.emitters()} - around
+    around -= {"ConstantBackgroundEmitter"} if clouds and lights <= {"DirectionalEmitter"} else set()
+    return [emitter for emitter in scene.emitters() if lights and emitter.class_name() in around]
+
+
+def scene_notes(scene, *, clouds: bool = True) -> list[str]:
+    """Return what the user should know of the cameras and the lights of a Mitsuba scene, a line each."""
+    cameras = len(scene.sensors())
+    notes = [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
+    notes += [
+        f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
+        + " by methods: references and fog colours have it" * (emitter.class_name() == "ConstantBackgroundEmitter")
+        for emitter in backgrounds(scene, clouds=clouds)
+    ]
+    return notes
+
+
+def describe(features: SceneFeatures) -> dict[str, str]:
+    """Return the features in words, one entry for each decision."""
+    counts = (
+        ("point", features.point_lights),
+        ("spot", features.spot_lights),
+        ("directional", features.directional_lights),
+    )
+    lights = [f"{count} {kind}" for kind, count in counts if count]
+    lights += [f"{count} {shape} with extent" for shape, count in Counter(features.area_lights).items()]
+    lights += [f"a sky, as a beam from {features.sky}"] if features.sky else []
+    words = {
+        "surfaces": "lit surfaces" if features.surfaces else "none: no ray is cast for the camera",
+        "shadows": "visibility tests" if features.shadows else "none: nothing casts a shadow",
+        "extinction": "one for all channels"
+        if features.extinctions == 1
+        else "one for each channel: three integrals a ray",
+        "phase function": "isotropic: left out of the integrand"
+        if features.isotropic
+        else "anisotropic: split at the foot point",
+        "medium": f"{len(features.concave)} clouds in clear air, bounded by meshes: rays cast at them"
+        + f", {features.uneven} with a grid of densities: marched" * bool(features.uneven)
+        if features.concave
+        else f"bounded, in {'clear air' if features.clear else 'another medium'}: rays clipped, no kernel"
+        if features.bounded
+        else "height fog: depths and suns in closed form, panels of nodes for lights at places"
+        if features.height_fog
+        else "a density grid: marched, depths from cell to cell"
+        if features.grid
+        else "unbounded: every ray lies in it whole",
+        "lights": " and ".join(lights),
+        "spot falloff": "inside the cone: integrand weighted"
+        if features.soft_spots
+        else "none: rays are clipped to cones at most",
+    }
+    return words

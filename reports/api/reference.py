@@ -143,7 +143,7 @@ def reference(
     from reports.machine.environment import activate
 
     activate()
-    from realtime.scene.features import scene_notes
+    from realtime.scene.read_scene import scene_notes
     from reports.api.scenes import opened
 
     loaded = opened(scene, pixels_of(size), changes)

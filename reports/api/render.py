@@ -268,7 +268,7 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
 
     from realtime.frame.samples import render_samples
     from realtime.methods.shader.source import is_shader
-    from realtime.scene.features import describe
+    from realtime.scene.read_scene import describe
     from reports.api.results import Rendering, sealed
     from reports.machine.environment import activate
     from validation.study.configuration import prepared
@@ -392,8 +392,8 @@ def _plan(asked: _Asked) -> "Plan":
     from realtime.methods.shadow_planes.method import ShadowPlanes
     from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
     from realtime.parameters import values
-    from realtime.scene.features import describe
     from realtime.scene.light_points import with_light_points
+    from realtime.scene.read_scene import describe
     from reports.api.results import Plan
     from validation.study.configuration import prepared
 

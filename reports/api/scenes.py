@@ -105,8 +105,7 @@ def _from_mitsuba(scene: Any) -> OpenScene:
 
 @one_error
 def _described(loaded: OpenScene) -> tuple[dict[str, str], tuple[str, ...]]:
-    from realtime.scene.features import describe
-    from realtime.scene.read_scene import read_scene
+    from realtime.scene.read_scene import describe, read_scene
 
     features = read_scene(loaded.scene).features
     return describe(features), features.notes

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from realtime.scene.features import describe
+from realtime.scene.read_scene import describe
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import Image, write_exr
 from reports.data.reader import record_of

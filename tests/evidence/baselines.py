@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 
 from realtime.kernels.registry import KERNELS
-from realtime.scene.features import SceneFeatures
-from realtime.scene.read_scene import Scene, read_scene
+from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import plain

@@ -17,9 +17,8 @@ import numpy as np
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.kernels.registry import KERNELS
-from realtime.kernels.table import prepare_kernel, with_tables
 from realtime.numerics.array_types import aligned_array
-from realtime.numerics.recorded import Frozen
+from realtime.numerics.recorded import Frozen, prepare_kernel, with_tables
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous

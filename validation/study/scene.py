@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.frame.renderer import Frame
-from realtime.scene.features import SceneFeatures
-from realtime.scene.read_scene import Scene, read_scene
+from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image
 from reference.storage.kept import Kept, is_kept, key_of

@@ -28,10 +28,9 @@ from realtime.numerics.noise import PATTERNS, Noise
 from realtime.parameters import Parameters, defaults, parameter, read_parameters, values
 from realtime.rays import RayGeometry, ray_geometry
 from realtime.scene.camera import Camera, ray_directions, row_and_column
-from realtime.scene.features import SceneFeatures
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import LitRays, Medium, Rays
-from realtime.scene.read_scene import Scene
+from realtime.scene.read_scene import Scene, SceneFeatures
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,6 @@ from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_
 from realtime.numerics.array_types import ArrayTypes, host_numbers, types_of
 from realtime.parameters import parameter
 from realtime.scene.camera import HostCamera, read_camera
-from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
 from realtime.scene.media.bounded_rays import FORMS, BoundedRays
 from realtime.scene.media.medium import LitRays
@@ -279,7 +278,7 @@ class PlanePreparation:
         types = types_of(type(scene.camera.origin.x))
         each = [
             plane_finder(
-                here, camera, light, cone=self.cone, order=self.order, types=types, own=source_shape(scene, light)
+                here, camera, light, cone=self.cone, order=self.order, types=types, own=scene.source_shape(light)
             )
             for light in scene.lights
         ]

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from realtime.methods.shadow_planes.plane_table import light_basis, shadow_planes
 from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from realtime.scene.camera import HostCamera, read_camera
-from realtime.scene.light_points import source_shape
 from realtime.scene.lights import Light, host_position
 from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
 from realtime.scene.read_scene import Scene
@@ -40,7 +39,7 @@ def caster_plan(scene: Scene) -> CasterPlan:
     """
     casters = with_positions(read_casters(scene.geometry, scene.area_lights), scene.positions)
     camera = read_camera(scene.camera)
-    lights = tuple(_light_plan(casters, camera, light, source_shape(scene, light)) for light in scene.lights)
+    lights = tuple(_light_plan(casters, camera, light, scene.source_shape(light)) for light in scene.lights)
     return CasterPlan(
         shapes=len(casters.shapes),
         components=len(casters.closed),

@@ -5,8 +5,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from realtime.kernels.exact import PANEL_NODES, panels_mean
-from realtime.kernels.quadrature import path_interval
+from realtime.kernels.exact import PANEL_NODES, panels_mean, path_interval
 from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays import RayGeometry
 from tests.helpers.kernel_values import phase_of

@@ -12,8 +12,7 @@ from scipy import stats
 from analytic.errors import InputError
 from realtime.memory import Memory
 from realtime.methods.unshadowed import unshadowed
-from realtime.scene.features import SceneFeatures
-from realtime.scene.read_scene import read_scene
+from realtime.scene.read_scene import SceneFeatures, read_scene
 from reports.commands.main import run as run_command
 from validation.estimates import agreement
 from validation.estimates.quadrature import reference_of_pixels
