@@ -25,22 +25,25 @@ Rooms:
 - `methods/`: the methods, and in `methods/interface/` what all of them share with frames;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
 
-**One frame, from XML to pixel**: the files that `airlight render hall --method shadow-planes` passes, in this order.
+**One frame, from XML to pixel**: the files of this room that `airlight render hall --method shadow-planes` passes, in
+this order, as `python docs/tools/frame_path.py hall shadow-planes` lists them.
 
 1. `scene/read_scene.py` reads what Mitsuba loaded: `scene/camera.py`, `scene/read_media.py` and `scene/lights.py` the
-   parts, `scene/features.py` what of them asks for code, `scene/triangle_table.py` what shading needs of triangles.
-2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its parameters, and later
-   the view of the rays that it renders.
-3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of lights.
+   parts, and `scene/triangle_table.py` what shading needs of triangles. Arrays come from `numerics/array_types.py`.
+2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its parameters
+   (`parameters.py`), and later the view of the rays that it renders.
+3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of lights, by
+   `numerics/recorded.py`.
 4. `methods/shadow_planes/method.py` prepares: `scene/mesh_adjacency.py` reads how triangles hang together,
    `methods/shadow_planes/silhouettes.py` finds the edges that bound shadows, and
-   `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light.
+   `methods/shadow_planes/plane_table.py` makes planes of them, in wedges of azimuth about the light
+   (`numerics/functions.py`).
 5. `frame/surface.py` casts the camera rays and shades what they meet, without shadows.
 6. `rays.py` says where each ray of the view passes the light, and a spot's cone.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals.py`).
-8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the kernel that
-   `kernels/registry.py` has under a name: `kernels/exact.py`.
+8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the kernel,
+   `kernels/exact.py`, which asks the phase function (`scene/phase.py`).
 9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings both to the host;
    `frame/light_on_ray.py` checks that all of it is finite.
 """

@@ -128,11 +128,6 @@ _MANY, _CHUNK = 1e9, 1 << 22  #: vertices times triangles that are looked at, in
 _SHEARED = 1e-4  #: of a length: how far from a right angle or from another length, after float32
 
 
-def is_area_light(emitter) -> bool:
-    """Return whether a Mitsuba emitter is the light of a shape."""
-    return emitter.class_name() == "AreaLight"
-
-
 def read_area_light(shape: Any, camera: Array) -> AreaLight:
     """Read the light of a Mitsuba shape.
 

@@ -3,7 +3,7 @@
 
 Read in this order:
 
-- `camera.py`: from a pixel to a ray;
+- `camera.py`: the pinhole camera, from a pixel to a ray;
 - `phase.py`: phase functions, which say their values, widths and series;
 - `density.py`: clouds whose density differs from place to place;
 - `lights.py`: point, spot and directional lights as homogeneous positions;
@@ -14,7 +14,7 @@ Read in this order:
 - `triangle_table.py`: what shading needs of every triangle;
 - `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;
 - `read_media.py`: reads the media of a Mitsuba scene;
-- `read_scene.py`: reads a Mitsuba scene;
+- `read_scene.py`: reads a Mitsuba scene, and says what it needs of a method;
 - `light_points.py`: lights with extent as light points;
 - `light_table.py`: lights of one structure as a table, from which rays take them by chance;
 - `animate.py`: the scene after lights, the medium or objects moved.

@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.shape import AreaLight, is_area_light, read_area_light
+from realtime.area_lights.shape import AreaLight, read_area_light
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, array_types, types_of
 from realtime.scene.camera import Camera, sensor_camera
@@ -141,7 +141,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
         if emitter.class_name() == "ConstantBackgroundEmitter" and medium.clouds is not None
         else _read_light(emitter, types)
         for emitter in scene.emitters()
-        if not is_area_light(emitter) and emitter not in behind
+        if emitter.class_name() != "AreaLight" and emitter not in behind
     )
     here = np.array(camera.origin, dtype=np.float64).ravel()
     area_lights = tuple(read_area_light(shape, here) for shape in scene.shapes() if shape.is_emitter())

@@ -31,7 +31,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
-from realtime.area_lights.shape import is_area_light
 from realtime.scene.animate import turned_light
 from realtime.scene.lights import Light
 from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
@@ -164,7 +163,7 @@ def subdivided(scene, levels: int) -> Any:
 
 def with_shapes(scene, shapes: Iterable[Any]) -> Any:
     """Return a Mitsuba scene of other shapes, with the camera and the lights without extent of one."""
-    emitters = (emitter for emitter in scene.emitters() if not is_area_light(emitter))
+    emitters = (emitter for emitter in scene.emitters() if emitter.class_name() != "AreaLight")
     parts = {f"emitter-{number}": emitter for number, emitter in enumerate(emitters)}
     return scene_of(list(shapes), {"sensor": scene.sensors()[0]} | parts)
 

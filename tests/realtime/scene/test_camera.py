@@ -8,8 +8,8 @@ import pytest
 
 from realtime.frame.renderer import render_frame
 from realtime.numerics.array_types import array_types
-from realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column
-from realtime.scene.read_scene import _read_camera, read_scene
+from realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
+from realtime.scene.read_scene import read_scene
 from validation.scenes.loading import load_scene
 from validation.study.configuration import configuration, prepared
 
@@ -28,7 +28,7 @@ def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
         "film": {"type": "hdrfilm", "width": size[0], "height": size[1]},
     }
     scene = mi.load_dict({"type": "scene", "sensor": sensor})
-    camera, plugin = _read_camera(scene, array_types("double"))
+    camera, plugin = sensor_camera(scene, array_types("double"))
     if pixels is not None:  # of the same picture, and no squares
         camera, size = resized_camera(camera, *pixels), pixels
     pixel = np.arange(size[0] * size[1])
@@ -45,7 +45,7 @@ def test_aim_is_kept_to_twice_the_digits(variant):
     film = {"type": "hdrfilm", "width": 801, "height": 601}
     scene = mi.load_dict({"type": "scene", "s": {"type": "perspective", "fov": 63.7, "to_world": matrix, "film": film}})
     pixel = mi.UInt32(np.arange(0, 801 * 601, 7, dtype=np.uint32))
-    camera = _read_camera(scene, array_types())[0]
+    camera = sensor_camera(scene, array_types())[0]
     direction, aim = (np.array(part, dtype=np.float64).T for part in ray_directions(camera, pixel))
     forward, left, up = (np.array(axis).ravel() for axis in camera.axes)
     number = np.arange(0, 801 * 601, 7)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The files of `realtime` that a frame passes: `python docs/tools/frame_path.py SCENE METHOD`.
+
+Those in which a function runs from the loaded Mitsuba scene to the image, in the order of their first call.
+"""
+
+import sys
+from pathlib import Path
+
+from realtime.frame.renderer import frame_renderer, render_frame
+from realtime.kernels.registry import KERNELS
+from realtime.methods.registry import find_method
+from realtime.scene.read_scene import read_scene
+from reports.machine.environment import activate
+from validation.scenes.loading import load_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def files_of_frame(scene: str, method: str) -> list[str]:
+    """Return the files, relative to the repository."""
+    activate()
+    loaded, passed = load_scene(scene, (64, 48)).scene, dict[str, None]()
+    sys.setprofile(lambda frame, event, _: passed.setdefault(frame.f_code.co_filename) if event == "call" else None)
+    try:
+        render_frame(frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"].function))
+    finally:
+        sys.setprofile(None)
+    paths = (Path(name) for name in passed)
+    inside = (path.relative_to(ROOT).as_posix() for path in paths if path.is_relative_to(ROOT))
+    return [name for name in inside if name.startswith("realtime/")]
+
+
+if __name__ == "__main__":
+    for number, name in enumerate(files_of_frame(*sys.argv[1:]), 1):
+        print(number, name)
