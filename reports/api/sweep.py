@@ -199,8 +199,7 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, pro
     missing, counts = part(place, cell_groups, with_errors, quick=quick)
     untimed, timed = 0, Counter[str]()
     if study.measure.times == "alone":
-        where = replace(place, workers=1) if place.workers else place
-        untimed, timed = part(where, timing_groups, with_times)
+        untimed, timed = part(1 if isinstance(place, int) else place, timing_groups, with_times)
     total, computed = study.scene_count * study.cells_by_scene, counts.total() - counts["lost"]
     return SweepRun(
         study=study.name,

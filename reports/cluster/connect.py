@@ -7,7 +7,6 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +23,7 @@ _ADDRESS = re.compile(r"(tcp|tls|ucx|ws|wss)://[^\s/]+")
 Client = Any  #: `distributed.Client`
 
 
-@dataclass(frozen=True)
-class Place:
-    """What `--cluster` names."""
-
-    workers: int = 0  #: of this machine; 0 for a scheduler
-    scheduler: str = ""  #: its address, or the file that has it
+Place = int | str  #: what `--cluster` names: processes of this machine, or a scheduler's address, or a file that has it
 
 
 def parse_place(word: str | None) -> Place:
@@ -39,11 +33,11 @@ def parse_place(word: str | None) -> Place:
     require("distributed", "sweep", "work on several processes or machines")
     word = "local" if word is None else word.strip()
     if word == "local":
-        return Place(threads())
+        return threads()
     if local := re.fullmatch(r"local:([1-9]\d{0,3})", word):
-        return Place(int(local[1]))
+        return int(local[1])
     if _ADDRESS.fullmatch(word) or Path(word).is_file():
-        return Place(scheduler=word)
+        return word
     raise InputError(
         f"--cluster: got {word!r}, wanted local, local:N with up to 9999 processes, tcp://HOST:PORT, or the file that "
         "`dask scheduler --scheduler-file` writes"
@@ -54,7 +48,7 @@ def parse_place(word: str | None) -> Place:
 def connected(place: Place, *, quick: bool = False) -> Iterator[Client]:
     """Give the connection to a place; `quick` compiles kernels quickly in its processes, where nothing is timed."""
     _quiet()
-    with _local(place.workers, quick=quick) if place.workers else _remote(place.scheduler) as client:
+    with _local(place, quick=quick) if isinstance(place, int) else _remote(place) as client:
         yield client
 
 
@@ -67,22 +61,23 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
     from reference.storage.files import temporary_folder
 
     alone = workers == 1
-    # Dask would pause a worker near its limit, and wait for memory that only the next task gives back.
-    memory = {f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")}
-    # What became of a group whose process died is decided by `reports.cluster.run`.
-    counts: dict[str, object] = {"distributed.scheduler.allowed-failures": 0}
-    # No group waits behind another that takes minutes while a worker has nothing to do.
-    counts["distributed.scheduler.worker-saturation"] = 1.0
-    # Dask lets the C library give every freed block back, and arrays of a frame's size come as new, zeroed pages: a
-    # quarter of a sweep's time was the kernel's.
-    counts["distributed.nanny.pre-spawn-environ"] = {
-        "MALLOC_TRIM_THRESHOLD_": _KEPT,
-        "MALLOC_MMAP_THRESHOLD_": _KEPT,
-        "OMP_NUM_THREADS": 1,
+    settings: dict[str, object] = {
+        # Dask would pause a worker near its limit, and wait for memory that only the next task gives back.
+        **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")},
+        # What became of a group whose process died is decided by `reports.cluster.run`.
+        "distributed.scheduler.allowed-failures": 0,
+        # No group waits behind another that takes minutes while a worker has nothing to do.
+        "distributed.scheduler.worker-saturation": 1.0,
+        # Dask lets the C library give every freed block back, and arrays of a frame's size come as new, zeroed pages: a
+        # quarter of a sweep's time was the kernel's.
+        "distributed.nanny.pre-spawn-environ": {
+            **{f"MALLOC_{name}_THRESHOLD_": _KEPT for name in ("TRIM", "MMAP")},
+            "OMP_NUM_THREADS": 1,
+        },
+        # A cluster that is told of a death waits so long and then forgets the worker, though another stands in.
+        "distributed.deploy.lost-worker-timeout": 86400,
     }
-    # A cluster that is told of a death waits so long and then forgets the worker, though another process stands in.
-    counts["distributed.deploy.lost-worker-timeout"] = 86400
-    with temporary_folder() as folder, dask.config.set(memory | counts), ExitStack() as stack:
+    with temporary_folder() as folder, dask.config.set(settings), ExitStack() as stack:
         with _without_interrupts():
             _start_quiet_tracker()
             cluster = stack.enter_context(

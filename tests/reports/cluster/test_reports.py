@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from reports.cluster.connect import Place, connected
+from reports.cluster.connect import connected
 from reports.data.reader import report_text
 from reports.report.measure import write_report
 from validation.study.configuration import configuration
@@ -43,7 +43,7 @@ def test_a_report_from_a_cluster_says_the_same(tmp_path, monkeypatch, variant):
         return without_times(json.loads(report_text(data))), images
 
     alone, images = report("alone", None)
-    with connected(Place(2)) as cluster:
+    with connected(2) as cluster:
         together, others = report("together", cluster)
     assert together["scenes"][0]["agreement"] == alone["scenes"][0]["agreement"]
     assert together == alone
