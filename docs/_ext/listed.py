@@ -181,6 +181,6 @@ def report_keys(*parts: str) -> str:
     """Return tables of the keys of parts of `report.json`, or of the file itself, from its records."""
     found = []
     for part in parts or ("report",):
-        rows = [(f"`{name}`", what) for name, what in meanings(getattr(records, part.capitalize())).items()]
+        rows = [(f"`{name}`", what) for name, what in meanings(getattr(records, part.capitalize()), units=True).items()]
         found.append((f"**{part}**\n\n" if parts else "") + table(("key", "what it is"), rows, 2))
     return "\n".join(found)

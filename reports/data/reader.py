@@ -4,7 +4,7 @@
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict, fields
 from pathlib import Path, PureWindowsPath
 from typing import Any, TypeVar
 
@@ -95,16 +95,14 @@ def schema() -> dict[str, Any]:
 
     made = msgspec.json.schema(Report)
     for name, shown in made["$defs"].items():
-        for key, meaning in meanings(getattr(records, name)).items():
+        for key, meaning in meanings(getattr(records, name), units=True).items():
             shown["properties"][key] = {**shown["properties"][key], "description": meaning}
     return made
 
 
-def meanings(record: type) -> dict[str, str]:
-    """Return what the keys of a record mean, with their units."""
-    assert is_dataclass(record)
-    return {each.name: _meaning(*each.metadata.get("column", ("", None, ""))) for each in fields(record)}
-
-
-def _meaning(heading: str, unit: str | None, meaning: str) -> str:
-    return f"{meaning} [{unit}]".strip() if unit else meaning
+def meanings(record: Any, *, units: bool = False) -> dict[str, str]:
+    """Return what the keys of a record mean, with their units where that is asked for."""
+    said = {each.name: each.metadata.get("column", ("", None, "")) for each in fields(record)}
+    return {
+        name: f"{meaning} [{unit}]".strip() if units and unit else meaning for name, (_, unit, meaning) in said.items()
+    }

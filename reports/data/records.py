@@ -179,13 +179,13 @@ class Timing:
 class Times:
     """The times of a frame and of its stages; of an image the frame alone."""
 
-    frame: Timing
-    airlight: Timing | None = None
-    surface: Timing | None = None
-    light_moved: Timing | None = None
-    objects_moved: Timing | None = None
-    light_moved_camera_cached: Timing | None = None
-    colours_changed: Timing | None = None
+    frame: Timing = column(meaning="a whole frame while nothing moves: median and quartiles")
+    airlight: Timing | None = column(meaning="the airlight alone, with the lists of tiles", default=None)
+    surface: Timing | None = column(meaning="camera rays and the lit surface", default=None)
+    light_moved: Timing | None = column(meaning="a frame after the light moved, shadow maps again", default=None)
+    objects_moved: Timing | None = column(meaning="a frame after objects moved too", default=None)
+    light_moved_camera_cached: Timing | None = column(meaning="the same light, camera rays reused", default=None)
+    colours_changed: Timing | None = column(meaning="a frame after medium or colours alone changed", default=None)
 
     @property
     def stages(self) -> dict[str, Timing]:

@@ -113,11 +113,9 @@ def _methods(old: Scene, new: Scene) -> tuple[list[Finding], int]:
         elif old_entry.layer != new_entry.layer:
             findings.append(Finding("note", name, label, "errors not compared: they are of different layers"))
         elif reason is None:
-            both, noisy = (old_entry, new_entry), bool(old_entry.noise and new_entry.noise)
-            for layer, (was, is_now) in (
-                ("", map(_of_runs if noisy else _of_image, both)),
-                ("surface ", (_numbers(each.surface_error) for each in both)),
-            ):
+            noisy = bool(old_entry.noise and new_entry.noise)
+            both = [(_errors_of(each, noisy), _numbers(each.surface_error)) for each in (old_entry, new_entry)]
+            for layer, was, is_now in zip(("", "surface "), *both):
                 changes, count = _errors(was, is_now, prefix=layer)
                 findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
                 compared += count
@@ -155,16 +153,13 @@ def _numbers(errors: Errors | None) -> Numbers:
     return asdict(errors) if errors else {}
 
 
-def _of_image(entry: MethodRow) -> Numbers:
-    return _numbers(entry.error)
-
-
-def _of_runs(entry: MethodRow) -> Numbers:
-    """Return the errors of a method that draws random numbers: those of its runs, without quantiles of a single one."""
-    assert entry.noise
-    noise, error = asdict(entry.noise), _numbers(entry.error)
-    kept = {name: error[name] for name in ("pixels", "nonfinite", "negative")}
-    return kept | {f"relative_{name}": noise[name] for name in ("rmse", "bias", "rmse_within", "bias_within")}
+def _errors_of(entry: MethodRow, noisy: bool) -> Numbers:
+    """Return the errors of an image, or those of noisy runs, without quantiles of a single one."""
+    error = _numbers(entry.error)
+    if not noisy or entry.noise is None:
+        return error
+    noise = {f"relative_{name}": value for name, value in vars(entry.noise).items()}
+    return {name: error[name] for name in ("pixels", "nonfinite", "negative")} | noise
 
 
 def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], int]:

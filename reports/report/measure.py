@@ -154,8 +154,8 @@ def settings(study: Study) -> Settings:
     """Return what a study asked for."""
     measure, checks = study.measure, study.checks
     asked = {
-        **{name: getattr(checks, name) for name in ("margins", "samples", "batches", "multiple", "patience")},
-        **{name: getattr(measure, name) for name in ("seconds", "slow", "limit")},
+        **vars(checks),
+        **vars(measure),
         "name": study.name,
         "scenes": tuple(study.scene_names()),
         "image": study.sizes[0],

@@ -5,7 +5,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from realtime.methods.shader.source import is_shader
-from reports.data.records import MethodRow, Scene, Timing
+from reports.data.reader import meanings
+from reports.data.records import MethodRow, Scene, Times, Timing
 from reports.tables.table import (
     Column,
     Name,
@@ -19,30 +20,17 @@ from reports.tables.table import (
     table,
     words,
 )
+from validation.columns import columns_of
+from validation.metrics.errors import Metrics
 
 #: What is timed of a frame, by its name in report.json.
-TIMES = ("frame", "airlight", "surface", "light_moved", "objects_moved", "light_moved_camera_cached", "colours_changed")
+TIMES = tuple(meanings(Times))
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 
-_RELATIVE = (
-    "{} of the pixels err by less: |error| over the reference, or over a thousandth of its mean where that is more"
-)
-_MEANINGS = {
-    "frame": "a whole frame while nothing moves: median and quartiles",
-    "device": "that draws a shader and times it, by OpenGL; all others are timed on the device of the report",
-    "airlight": "the airlight alone, with the lists of tiles",
-    "surface": "camera rays and the lit surface",
-    "light_moved": "a frame after the light moved, with shadow maps or planes again",
-    "objects_moved": "a frame after objects moved too",
-    "memory": "the peak of a frame that is prepared again, with its image on the host, beyond what was there before",
-    "relative_rmse": "root of the mean squared error over the reference's mean: errors of bright pixels weigh most",
-    "relative_bias": "mean error over the mean of the reference: below 0 the image as a whole is too dark",
-    "p50": _RELATIVE.format("half"),
-    "p99": _RELATIVE.format("99 of 100"),
-    "max": _RELATIVE.format("all"),
-    "flip": "the difference that an observer sees, over a range of exposures: 0 is none, 1 the largest",
-    "nonfinite": "pixels that are no number, which errors leave out",
-}
+_OF_ROWS = meanings(MethodRow)
+_MEANINGS = {column.key: column.meaning for column in columns_of(Metrics)} | meanings(Times)
+_MEANINGS |= {key: _OF_ROWS[key] for key in ("device", "memory", "flip")}
+_MEANINGS["nonfinite"] = "pixels that are no number, which errors leave out"
 
 _MS, _RATE, _SHARE, _MINOR = {"unit": "ms"}, {"whole": True}, {"digits": 2, "share": True}, {"minor": True}
 COLUMNS = {
