@@ -17,11 +17,12 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.export.languages import LANGUAGES
-from realtime.kernels.exact import DEEPEST, MOST_PANELS, PANEL_DEPTH, PANEL_NODES
+from realtime.kernels.exact import DEEPEST, MOST_PANELS
 from realtime.kernels.quadrature import positive_nodes
 from realtime.numerics.functions import EXP2, LOG2_E, SINH, unit_nodes
 from realtime.scene.media.medium import OPTICAL_REACH
 from realtime.scene.phase import Hazy, HenyeyGreenstein, HgDraine, Isotropic, Murky, Phase, Rayleigh
+from realtime.scene.rule_reach import PANEL_DEPTH, PANEL_NODES
 
 _LN2_HIGH = 355 / 512  # nine bits of ln 2
 _ROOT_HALF = 0x3F3504F3  # bits of the float32 sqrt(1/2)
@@ -208,7 +209,7 @@ def _interval(tail: str) -> str:
 
 def _exact(phase: Phase) -> str:
     if isinstance(phase, HenyeyGreenstein):
-        forward, backward = map(_number, phase.panels)
+        forward, backward = (_number(reach.panel) for reach in phase.reaches())
         lobe = f"""    float forward = max(g, 0.0);
     float backward = max(-g, 0.0);
     float scale = (1.0 - forward) / (1.0 + forward);

@@ -40,8 +40,8 @@ also have some T. So there are
 
     m = ceil(max((v1 - v0)/w, T/T1))
 
-equal panels. w and T1 are the largest that keep random rays of every magnitude within 1e-6 of the integral, rounding
-left aside, for each phase function, which knows its own w; `tests/realtime/kernels/test_panels.py` tries others.
+equal panels. w is the largest width at which the rule leaves no more than 1e-6 of any panel, which each phase function
+knows of itself (`realtime.scene.rule_reach`); `tests/realtime/kernels/test_panels.py` tries random rays.
 
 **What they cost.** All rays of a packet take part in as many steps as the one that needs most, no more. Panels of a ray
 are equally wide: sinh and cosh of the offsets of the nodes are the same in each, and computed once. From the start of a
@@ -63,9 +63,9 @@ length L all of them are r/L or more lengths away, r being the least distance be
 rule converges as fast for every ray with the same r/L (by the theorem above). The exponent changes fastest at the end,
 by sigma_t (1 + s1/r1) a metre.
 
-A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes, or eight, are right to
-1e-6 for random rays; `tests/realtime/kernels/test_exact.py` tries others. Nodes are places s0 + f L, s0 = x0
-- foot: close to the light, x itself has not the digits.
+A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes, or eight, leave no more
+than 1e-6, wherever the segment lies (`realtime.scene.rule_reach` again). Nodes are places s0 + f L, s0 = x0 - foot:
+close to the light, x itself has not the digits.
 """
 
 from collections.abc import Callable
@@ -81,7 +81,16 @@ from realtime.numerics.functions import LOG2_E, exp2_bounded, exp_bounded, sinh_
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous, optical_reach
-from realtime.scene.phase import Phase, Reach
+from realtime.scene.phase import Phase
+from realtime.scene.rule_reach import (
+    FEW_DEPTH,
+    FEW_NODES,
+    MORE_DEPTH,
+    MORE_NODES,
+    PANEL_DEPTH,
+    PANEL_NODES,
+    Reach,
+)
 
 
 @dataclass(frozen=True)
@@ -93,8 +102,8 @@ class Rule:
     length: Callable[[Reach], float]  #: largest L/r of a phase function [1]
 
 
-FEW = Rule(4, 2.0, lambda reach: reach.few)
-MORE = Rule(8, 10.0, lambda reach: reach.more)
+FEW = Rule(FEW_NODES, FEW_DEPTH, lambda reach: reach.few)
+MORE = Rule(MORE_NODES, MORE_DEPTH, lambda reach: reach.more)
 
 
 @dataclass
@@ -158,9 +167,8 @@ def _half_angle(s, r, inverse, height_squared):
     return dr.select(behind, large, small), dr.select(behind, small, large)
 
 
-PANEL_NODES, _NODES_DOUBLE = 8, 24  #: of a panel
+_NODES_DOUBLE = 24  # of a panel in float64
 MOST_PANELS = 160  #: no segment needs as many, but a loop over values that are not numbers must end too
-PANEL_DEPTH = 10.5  #: T1
 _SOFT = 0.85  #: w for a light whose intensity falls off
 _NO_RATE = 1e-30
 DEEPEST = 116.0  #: power of 2 beyond which nothing is left: e^-80

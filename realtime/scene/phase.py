@@ -6,31 +6,24 @@ Nishita 1987), 1 + 9((1+cos)/2)^8 and 1 + 50((1+cos)/2)^32, have the means 2 and
 
 A phase function is a class: its code is the class, its parameters are data. Kernels ask it for what they need, its
 values, the widths of its lobe, its power series, and know none by name. A new one derives from `Phase` and says its
-name and its values; what it does not say besides is taken from a function with kinks, which is slow and right for any,
-and what it does not have (a polynomial, a series) the kernels that need it refuse.
+name and its values. How far rules of few nodes reach is tried on these (`realtime.scene.rule_reach`); what it does not
+have (a polynomial, a series) the kernels that need it refuse.
 """
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from drjit.scalar import ArrayXf64
 
 from realtime.droplets import CUT, droplet_table, share_cut
 from realtime.errors import InputError
 from realtime.numerics.functions import between_entries, cell_of
-
-
-@dataclass(frozen=True)
-class Reach:
-    """How far rules of fixed sizes serve a phase function, each found by trial."""
-
-    panel: float = 0.4  #: widest panel of `realtime.kernels.exact`, in v
-    few: float = 0.1  #: longest segment for four nodes of `realtime.kernels.exact`, over its distance
-    more: float = 0.2  #: and for eight nodes
-    turn: float = 0.25  #: of the largest angle of a panel at the light, `realtime.scene.media.bounded_rays`
+from realtime.scene.rule_reach import Reach, reach_of, shortest
 
 
 class Phase:
@@ -38,7 +31,6 @@ class Phase:
 
     name: ClassVar[str]
     constant: ClassVar[bool] = False  #: whether it is 1 everywhere, so that integrands leave it out
-    reach: ClassVar[Reach] = Reach()
     polynomial: ClassVar[tuple[float, ...] | None] = None  #: coefficients of ((1 + cos)/2)^0, ^1, ..., if it is one
     scale: ClassVar[float] = 1.0  #: d of `realtime.kernels.exact`: about the E = q/h at which the lobe ends
 
@@ -60,13 +52,14 @@ class Phase:
         up = dr.rcp(square + 1)
         return c * up * self.evaluate_half(square * up, up)
 
+    @property
+    def reach(self) -> Reach:
+        """How far rules of few nodes reach; a function with arrays for parameters says it in another way."""
+        return _reach(self)
+
     def panel_width(self, Float) -> Any:
         """Return the widest panel in v, for arrays of a type."""
         return Float(self.reach.panel)
-
-    def largest_turn(self) -> Any:
-        """Return `Reach.turn`."""
-        return self.reach.turn
 
     def lobe_scales(self, Float) -> tuple[Any, Any]:
         """Return the E where a forward lobe ends, at most 1, and the E where a backward lobe begins, at least 1."""
@@ -83,7 +76,6 @@ class Isotropic(Phase):
 
     name = "isotropic"
     constant = True
-    reach = Reach(panel=2.9, few=0.55, more=1.7, turn=1.0)
     polynomial = (1.0,)
 
     def evaluate_half(self, down, up) -> Any:
@@ -108,7 +100,6 @@ class Rayleigh(Phase):
     """3 (1 + cos^2)/4."""
 
     name = "rayleigh"
-    reach = Reach(panel=1.5, few=0.5, more=1.5, turn=0.8)
     polynomial = (1.5, -3.0, 3.0)
 
     def evaluate_half(self, down, up) -> Any:
@@ -152,7 +143,6 @@ class Hazy(_Power):
     """(1 + 9 ((1 + cos)/2)^8) / 2."""
 
     name = "hazy"
-    reach = Reach(panel=1.15, few=0.45, more=1.3, turn=0.6)
     polynomial = (0.5, *[0.0] * 7, 4.5)
     scale = 0.7
     doublings, weight, mean = 3, 9.0, 2.0
@@ -171,7 +161,6 @@ class Murky(_Power):
     """(1 + 50 ((1 + cos)/2)^32) 33/83."""
 
     name = "murky"
-    reach = Reach(panel=0.75, few=0.4, more=1.3, turn=0.35)
     polynomial = (33 / 83, *[0.0] * 31, 50 * 33 / 83)
     scale = 0.5
     doublings, weight, mean = 5, 50.0, 83 / 33
@@ -192,9 +181,19 @@ class HenyeyGreenstein(Phase):
     g: Any  #: mean cosine, in (-1, 1)
 
     name = "hg"
-    reach = Reach(few=0.55, more=1.9)
-    #: Widest panels by the sign of g: a backward lobe rises within the range of integration.
-    panels: ClassVar[tuple[float, float]] = (2.4, 1.7)
+
+    @staticmethod
+    @lru_cache(maxsize=1)
+    def reaches() -> tuple[Reach, Reach]:
+        """Return how far rules reach for all forward lobes, and for all backward ones: g may be another by lane."""
+        even = _reach(HenyeyGreenstein(0.0))
+        forward, backward = (_reach(HenyeyGreenstein(g)) for g in (_SHARP, -_SHARP))
+        return shortest(even, forward), shortest(even, backward)
+
+    @property
+    def reach(self) -> Reach:
+        """How far rules reach whatever g is."""
+        return shortest(*self.reaches())
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
@@ -222,13 +221,9 @@ class HenyeyGreenstein(Phase):
         return dr.sqrt(dr.fma(square, inverse, inverse)) * inverse * c * ((1 + g) / dr.square(1 - g))
 
     def panel_width(self, Float) -> Any:
-        """Return the widest panel in v by the sign of g."""
-        forward, backward = (Float(width) for width in self.panels)
+        """Return the widest panel in v by the sign of g: a backward lobe rises within the range of integration."""
+        forward, backward = (Float(reach.panel) for reach in self.reaches())
         return dr.select(Float(self.g) >= 0, forward, backward)
-
-    def largest_turn(self) -> Any:
-        """Return the share of the largest angle, about the width of the lobe."""
-        return dr.maximum(1 - dr.abs(self.g), 0.03)
 
     def lobe_scales(self, Float) -> tuple[Any, Any]:
         """Return (1 - |g|)/(1 + |g|) of a forward lobe, and its inverse of a backward one."""
@@ -250,8 +245,20 @@ class Tabulated(Phase):
     """Linear between values of mean 1 at regularly spaced cosines from -1 to 1."""
 
     values: Any
+    lobe: float = 1.0  #: E = tan(angle/2) at which a forward lobe has fallen to half, at most 1
+    reaches: Reach | None = None  #: as `tabulated` finds it
 
     name = "tabulated"
+
+    @property
+    def reach(self) -> Reach:
+        """How far rules reach in the table."""
+        assert self.reaches is not None
+        return self.reaches
+
+    def lobe_scales(self, Float) -> tuple[Any, Any]:
+        """Return the E where the lobe ends, and 1."""
+        return Float(self.lobe), 1.0
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
@@ -264,19 +271,6 @@ class Tabulated(Phase):
 
 
 @dataclass(frozen=True)
-class PeakedTable(Tabulated):
-    """A table that resolves a narrow forward lobe, such as that of droplets."""
-
-    lobe: float  #: E = tan(angle/2) at which it has fallen to half of the forward value
-
-    reach = Reach(panel=0.3, few=0.004, more=0.015, turn=0.03)
-
-    def lobe_scales(self, Float) -> tuple[Any, Any]:
-        """Return the E where the lobe ends, and 1."""
-        return Float(self.lobe), 1.0
-
-
-@dataclass(frozen=True)
 class HgDraine(Phase):
     """(1 - w) of Henyey and Greenstein's function and w of Draine's, which Jendersie and d'Eon 2023 fitted to droplets.
 
@@ -286,7 +280,6 @@ class HgDraine(Phase):
     diameter: float  #: of the droplets [um], 5 to 50
 
     name = "hg-draine"
-    reach = Reach(panel=1.3, few=0.4, more=1.3, turn=0.03)
 
     def __post_init__(self):
         if not 5 <= self.diameter <= 50:
@@ -338,14 +331,15 @@ class Mie(Phase):
 
     entries: Any  #: values and slopes in turn
     lobe: float  #: E = tan(angle/2) at which the peak has fallen to half
-    width: float  #: widest panel of `realtime.kernels.exact`: the finer the function ripples, the narrower
+    reaches: Reach | None = None  #: as `named_phase` finds it: the finer the function ripples, the shorter
 
     name = "mie"
-    reach = Reach(few=0.01, more=0.04, turn=0.03)
 
-    def panel_width(self, Float) -> Any:
-        """Return the widest panel in v."""
-        return Float(self.width)
+    @property
+    def reach(self) -> Reach:
+        """How far rules reach among the ripples."""
+        assert self.reaches is not None
+        return self.reaches
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2, Hermite's cubic between two entries."""
@@ -368,7 +362,7 @@ class Mie(Phase):
 class ModifiedMie(Mie):
     """The same without what is below five degrees, divided by what is left (Bouthors 2008, appendix)."""
 
-    left: float  #: share of the light beyond five degrees
+    left: float = 1.0  #: share of the light beyond five degrees
 
     name = "mie-modified"
 
@@ -390,11 +384,11 @@ PHASES: tuple[type[Phase], ...] = (
     ModifiedMie,
 )
 
-#: Width of a panel times terms of the series, up to which float32 is right to 3e-5 on random rays at r_e = 6 um.
-_RIPPLE = 107.0
+#: |g| by which rules for Henyey and Greenstein's function are judged, beside 0: of more they reach as far.
+_SHARP = 0.95
 
-#: Largest E of a lobe for which a table is a `PeakedTable`.
-_NARROW = 0.1
+#: What rules may leave where a table leaves more between its entries.
+_LEFT_TABLE, _LEFT_DROPLETS = 1e-3, 1e-5
 
 
 def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
@@ -434,17 +428,27 @@ def tabulated(values) -> Tabulated:
     host = np.array(values, dtype=np.float64)
     below = host < 0.5 * host[-1]
     cosine = np.linspace(-1.0, 1.0, len(host))[np.flatnonzero(below)[-1]] if below.any() else -1.0
-    lobe = math.sqrt((1 - cosine) / max(1 + cosine, 1e-6))
-    return PeakedTable(values, lobe) if lobe < _NARROW else Tabulated(values)
+    lobe = min(math.sqrt((1 - cosine) / max(1 + cosine, 1e-6)), 1.0)
+    eager = Tabulated(ArrayXf64(host))
+    return Tabulated(values, lobe, reach_of(eager.evaluate_half, (lobe, 1.0), _LEFT_TABLE))
 
 
 def _droplets(name: str, Float, radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> Phase:
     table = droplet_table(radius, gamma, wavelength)
-    entries = Float(table.entries)
-    width = min(0.3, _RIPPLE / table.terms)
-    if name == Mie.name:
-        return Mie(entries, table.peak, width)
-    return ModifiedMie(entries, math.tan(math.radians(0.5 * CUT)), width, 1 - share_cut(radius, gamma, wavelength))
+    eager, entries = Mie(ArrayXf64(table.entries), table.peak), Float(table.entries)
+    modified = name == ModifiedMie.name
+    lobe = math.tan(math.radians(0.5 * CUT)) if modified else table.peak
+    reach = reach_of(eager.evaluate_half, (lobe, 1.0), _LEFT_DROPLETS)
+    if modified:
+        return ModifiedMie(entries, lobe, reach, 1 - share_cut(radius, gamma, wavelength))
+    return Mie(entries, lobe, reach)
+
+
+@lru_cache(maxsize=64)
+def _reach(phase: Phase) -> Reach:
+    """Return how far rules reach for a phase function whose parameters are plain numbers."""
+    first, last = map(float, phase.lobe_scales(float))
+    return reach_of(phase.evaluate_half, (first, last))
 
 
 def series_product(left, right, degree: int) -> list[Any]:

@@ -15,7 +15,7 @@ the medium k (`realtime.scene.media.light_paths`), and
 Between two *bends*, where a path passes from facet to facet, or an edge, or grazes a sphere, or where the intensity of
 a spot begins to fall, all of this is smooth. A panel ends at a bend, and sooner where it would
 
-* turn by more than some angle about the light,
+* turn by more than some angle about the light, which depends on the phase function (`realtime.scene.rule_reach`),
 * be optically thicker than some depth, both paths together,
 * change 1 + e by more than some share of it: the length rises steeply where a path grazes its facet.
 
@@ -64,12 +64,12 @@ from realtime.numerics.functions import exp_bounded, summed, unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
 from realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach
+from realtime.scene.rule_reach import TANGENT, TURN_DEPTH, TURN_NODES, angle_scale
 
 FORMS = ("exact", "paper", "printed")
-_NODES, _NODES_DOUBLE = 4, 6
+_NODES_DOUBLE = 6
 _MOST = 1000  # panels; no segment needs as many, but a loop over values that are not numbers must end too
-_TANGENT = 0.45
-_DEPTH, _DEPTH_DOUBLE = 2.2, 1.6
+_DEPTH_DOUBLE = 1.6
 _NEARER, _FARTHER = 0.5, 0.8
 
 
@@ -245,9 +245,12 @@ def _longest(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes,
     longest, rate = type(x)(dr.inf), reduce(dr.maximum, piece.medium.sigma_t)
     if ray.light.w:
         s = x - ray.geometry.foot
-        tangent = _TANGENT * piece.medium.phase.largest_turn()
+        phase, e = piece.medium.phase, dr.select(s > 0, r + s, h) / dr.select(s > 0, h, r - s)
+        tangent = dr.minimum(
+            TANGENT, phase.reach.turn * angle_scale(dr.minimum(e, 1e9), *phase.lobe_scales(type(x)), dr.sqrt)
+        )
         if ray.light.varies:
-            tangent = dr.minimum(tangent, 0.4 * _TANGENT)
+            tangent = dr.minimum(tangent, 0.4 * TANGENT)
         turning = h - tangent * s
         longest = dr.select(turning > 0, tangent * dr.square(r) / turning, dr.inf)
         longest = dr.minimum(longest, dr.select(s < 0, _NEARER, _FARTHER) * r)
@@ -259,7 +262,7 @@ def _longest(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes,
         steepness, smooth = path.steepness(own, x, r)
         rate = rate + steepness * reduce(dr.maximum, path.bounded.medium.sigma_t)
         longest = dr.minimum(longest, smooth)
-    return dr.minimum(longest, (_DEPTH if is_single(type(x)) else _DEPTH_DOUBLE) / rate)
+    return dr.minimum(longest, (TURN_DEPTH if is_single(type(x)) else _DEPTH_DOUBLE) / rate)
 
 
 def _panel(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x0, x1) -> list[Any]:
@@ -274,7 +277,7 @@ def _panel(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x
         scale = length / product
         tangent = dr.square(h * scale)
     totals = [Float(0) for _ in piece.before]
-    for t, weight in unit_nodes(_NODES if is_single(Float) else _NODES_DOUBLE):
+    for t, weight in unit_nodes(TURN_NODES if is_single(Float) else _NODES_DOUBLE):
         if w:
             far = t * square0
             s = dr.fma(length, far / dr.fma(1 - t, product, far), s0)

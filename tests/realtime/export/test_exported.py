@@ -12,11 +12,12 @@ import pytest
 
 import airlight
 from realtime.export.text import BUILT_IN, CONFORMING, kernel_text
-from realtime.kernels.exact import PANEL_DEPTH, exact
+from realtime.kernels.exact import exact
 from realtime.kernels.quadrature import quadrature
 from realtime.methods.shader.client import ShaderHost
 from realtime.numerics.functions import unit_nodes
 from realtime.scene.phase import HenyeyGreenstein, named_phase
+from realtime.scene.rule_reach import PANEL_DEPTH
 from reports.api.export import MEASURED
 from reports.machine.driver_check import certified_rays, exported_values
 from tests.helpers.exported import KERNELS, PHASES, measured
@@ -107,8 +108,8 @@ def test_constants_are_those_of_the_kernels(legacy):
     for name, at in (("AL_X", 0), ("AL_W", 1)):
         words = re.search(rf"{name}\[8\] = float\[8\]\((.*)\);", code).group(1)
         assert [np.float32(word) for word in words.split(", ")] == [np.float32(node[at]) for node in unit_nodes(8)]
-    for width in HenyeyGreenstein.panels:
-        assert f"widest = {width};" in code
+    for reach in HenyeyGreenstein.reaches():
+        assert f"widest = {reach.panel};" in code
     assert f"width / {PANEL_DEPTH})" in code
 
 

@@ -5,9 +5,10 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from realtime.kernels.exact import PANEL_NODES, panels_mean, path_interval
+from realtime.kernels.exact import panels_mean, path_interval
 from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays import RayGeometry
+from realtime.scene.rule_reach import PANEL_NODES
 from tests.helpers.kernel_values import phase_of
 from tests.realtime.kernels.test_exact import NAMES, g_of, many_rays
 

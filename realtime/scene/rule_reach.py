@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far rules of Gauss and Legendre with few nodes reach for a phase function, by the error of the rules themselves.
+
+Kernels integrate exp(-depth) p/r^2 by rules of fixed sizes, in one variable or another. How long a panel may be depends
+on the phase function: where it has its lobe, and how steeply that rises. So the rule is tried on the phase function
+itself, once and in float64: a panel of some length, wherever it may begin, by the rule and by one of `_MANY` nodes. The
+longest panel is the one beyond which the two differ by more than `LEFT`. Three kinds of panels there are,
+
+- in v, of `realtime.kernels.exact`, of which E = d sinh v: the integrand is p/(1 + E^2) d cosh v, E >= 0;
+- in x, of its short segments: p/r^2, with the length over the least distance r from the light, and all of a length
+  alike, whatever the height, which is 1 here;
+- in the tangent of the angle at the light from where the panel begins, of `realtime.scene.media.bounded_rays`.
+
+Extinction takes its share: each is tried in a vacuum and up to the depth that a panel of its kind may have.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import astuple, dataclass
+from typing import Any
+
+import numpy as np
+from drjit.scalar import ArrayXf64
+from numpy.typing import NDArray
+
+from realtime.numerics.functions import WIDEST, unit_nodes
+
+Array = NDArray[np.float64]
+
+LEFT = 1e-6  #: of the integral over any panel in v or x
+LEFT_TURN = 1e-5  #: over panels about the light, of whose sums nobody asks more
+PANEL_NODES, PANEL_DEPTH = 8, 10.5  #: of panels in v
+FEW_NODES, FEW_DEPTH = 4, 2.0  #: of short segments
+MORE_NODES, MORE_DEPTH = 8, 10.0
+TURN_NODES, TURN_DEPTH, TANGENT = 4, 2.2, 0.45  #: of panels about the light, and their largest angle
+
+_MANY = 24
+_ENOUGH = 20.0  # depths, behind which kernels end
+_LEAST_PANEL = 0.11  # 160 panels reach up to E = 1e7: more a coarse table would not be worth
+_SHORTEST, _LONGEST = 1e-3, 2 * WIDEST  # between which a length is looked for; `sinh_bounded` serves half a panel
+_HALVINGS = 9  # to 1.6 %
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The longest panels of rules."""
+
+    panel: float  #: in v
+    few: float  #: segments of four nodes in x, over their distance from the light
+    more: float  #: of eight
+    turn: float  #: tangent of the angle of a panel at the light, over `angle_scale`
+
+
+def shortest(*reaches: Reach) -> Reach:
+    """Return how far rules reach for several phase functions alike."""
+    return Reach(*map(min, *map(astuple, reaches)))
+
+
+def reach_of(half: Callable[[Any, Any], Any], ends: tuple[float, float], left: float = LEFT) -> Reach:
+    """Return how far the rules reach for a phase function.
+
+    `half`: its value from sin^2 and cos^2 of half the scattering angle, of eager arrays; `ends`: the E at which its
+    forward lobe ends and its backward one begins; `left`: what a rule may leave.
+    """
+
+    def value(e: Array) -> Array:
+        up = 1 / (1 + e * e)
+        values = half(ArrayXf64((e * e * up).ravel()), ArrayXf64(up.ravel()))
+        return np.broadcast_to(np.array(values), e.size).reshape(e.shape)
+
+    def of_segments(nodes: int, depth: float) -> float:
+        return _longest(lambda length: _segment_error(value, ends, length, nodes, depth), left)
+
+    return Reach(
+        max(_longest(lambda width: _panel_error(value, ends, width), left), _LEAST_PANEL),
+        of_segments(FEW_NODES, FEW_DEPTH),
+        of_segments(MORE_NODES, MORE_DEPTH),
+        _longest(lambda turn: _turn_error(value, ends, turn), max(left, LEFT_TURN)),
+    )
+
+
+def _longest(error: Callable[[float], float], left: float) -> float:
+    low, high = math.log(_SHORTEST), math.log(_LONGEST)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if error(math.exp(middle)) <= left else (low, middle)
+    return float(f"{math.exp(low):.3g}")  # the same on every machine
+
+
+def _error(integrand: Callable[[Array], Array], nodes: int) -> float:
+    """Return what a rule leaves at most of integrals from 0 to 1; the integrand is asked for a column of places."""
+    few, many = (np.array(unit_nodes(count)).T for count in (nodes, _MANY))
+    values = integrand(np.concatenate([few[0], many[0]])[:, None])
+    return float(np.max(np.abs(few[1] @ values[:nodes] / (many[1] @ values[nodes:]) - 1)))
+
+
+def _starts(ends: tuple[float, float]) -> Array:
+    """Return v from the axis to where both lobes are far behind."""
+    first, last = ends
+    return np.linspace(0, math.asinh(30 * last / first), 33)
+
+
+def _panel_error(value, ends, width: float) -> float:
+    v0, depth = (grid.ravel() for grid in np.meshgrid(_starts(ends), PANEL_DEPTH * np.array([0, 0.3, 1])))
+    rate = np.minimum(depth / (width * np.cosh(v0)), _ENOUGH / (np.sinh(v0 + width) - np.sinh(v0)))
+
+    def integrand(t):
+        v = v0 + width * t
+        e = ends[0] * np.sinh(v)
+        return value(e) / (1 + e * e) * np.cosh(v) * np.exp(-rate * (np.sinh(v) - np.sinh(v0)))
+
+    return _error(integrand, PANEL_NODES)
+
+
+def _segment_error(value, ends, length: float, nodes: int, depth: float) -> float:
+    first, last = ends
+    u = np.sinh(np.linspace(0, math.asinh(15 * max(1 / first, last)), 33))
+    across = np.linspace(0, 1, 9)
+    worst = 0.0
+    # Length and depth may reach their limits by themselves, together an ellipse.
+    for angle in (0, 0.4, 0.8, 1.2):
+        share = length * math.cos(angle)
+        long = share * np.hypot(1, u)
+        s0 = np.concatenate([u, -u - long, -across * share])
+        whole = np.concatenate([long, long, np.full(len(across), share)])
+        s1 = s0 + whole
+        rate = depth * math.sin(angle) / (_along(s1) / np.hypot(1, s1) * whole)
+
+        def integrand(t, s0=s0, whole=whole, rate=rate):
+            s = s0 + whole * t
+            e = _along(s)
+            return value(e) / (1 + s * s) * np.exp(-rate * (e - _along(s0)))
+
+        worst = max(worst, _error(integrand, nodes))
+    return worst
+
+
+def _along(s: Array) -> Array:
+    """Return E = s + r, height 1."""
+    r = np.hypot(1, s)
+    return np.where(s < 0, 1 / (r + np.abs(s)), r + s)
+
+
+def _turn_error(value, ends, turn: float) -> float:
+    first, last = ends
+    e0 = first * np.sinh(_starts(ends))
+    tangent = np.minimum(TANGENT, turn * angle_scale(e0, first, last))
+    half = np.arctan(e0)
+    room = np.pi - 2 * half - 1e-6  # up to the end of the ray
+    tangent = np.where(room < np.arctan(tangent), np.tan(np.minimum(room, 1.0)), tangent)
+    half, tangent, depth = np.tile(half, 2), np.tile(tangent, 2), np.repeat([0, TURN_DEPTH], len(half))
+
+    def integrand(t):
+        e = np.tan(half + 0.5 * np.arctan(t * tangent))
+        return value(e) / (1 + np.square(t * tangent)) * np.exp(-depth * t)
+
+    return _error(integrand, TURN_NODES)
+
+
+def angle_scale(e, first, last, sqrt=np.sqrt):
+    """Return d(angle)/dv at E [rad]: the angle at the light, and the v of both lobes; `sqrt` is that of the arrays.
+
+    With E = tan(theta/2 + pi/4), d(theta) = 2 dE/(1 + E^2), and dE = sqrt(E^2 + d^2) dv before a backward lobe.
+    """
+    square = e * e
+    return (2 / (1 + square)) * sqrt(square + first * first) * sqrt(1 + square / (last * last))
