@@ -35,7 +35,7 @@ class Exported(Result):
         return f"{self.kernel}, {self.phase}, {self.language}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight export --json` prints."""
+        """Return the text with what it is, and its largest error."""
         return {name: getattr(self, name) for name in ("kernel", "language", "phase", "error", "code")}
 
     @property

@@ -42,7 +42,6 @@ def reference(
     samples: int | None = None,
     error: float | None = None,
     seconds: float | None = None,
-    target: Literal["pooled", "worst"] = "pooled",
     seed: int = 0,
     orders: str | None = None,
     merge: Files = (),
@@ -71,11 +70,9 @@ def reference(
     samples
         For an estimator that samples: samples per pixel, at least 64; 2048 by default, 256 for clouds.
     error
-        For an estimator that samples: stop at this relative standard error, such as 0.001.
+        For an estimator that samples: stop at this relative standard error of the image, such as 0.001.
     seconds
         For an estimator that samples: stop after this time [s].
-    target
-        Whether `error` is the pooled error of the image or the error of its worst pixel.
     seed
         Seed of the first batch of samples; the next batches count up from it.
     orders
@@ -136,7 +133,7 @@ def reference(
             raise InputError(
                 f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take quadrature"
             )
-        budget = _budget(budgets, target, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
+        budget = _budget(budgets, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
     elif given:
         raise InputError(f"{given[0]}: is for {', '.join(_ESTIMATORS[1:])}; leave it out, or take one of these")
     changes = changes_of(change)
@@ -247,7 +244,7 @@ def _sampled(
         scene=loaded.name,
         image=sealed(found.image),
         estimator=estimator,
-        relative_error=found.errors[budget.target],
+        relative_error=found.errors["pooled"],
         details=_batches(found.image.attributes) | counted | errors,
     )
 
@@ -275,7 +272,7 @@ def _batches(attributes: Any) -> dict[str, Any]:
     return {name: attributes[f"airlight:{name}"] for name in ("spp", "batch_spp", "batches", "seeds")}
 
 
-def _budget(given: dict[str, Any], target: Any, *, usual: int) -> "Budget":
+def _budget(given: dict[str, Any], *, usual: int) -> "Budget":
     from validation.estimates.images import Budget
 
     named = [name for name, value in given.items() if value is not None]
@@ -285,8 +282,4 @@ def _budget(given: dict[str, Any], target: Any, *, usual: int) -> "Budget":
         kind, words = (int, "a whole number") if name == "samples" else (int | float, "a number")
         if not isinstance(given[name], kind) or not given[name] > 0:
             raise InputError(f"{name}: got {given[name]!r}, wanted {words} above 0")
-    if target not in ("pooled", "worst"):
-        raise InputError(f"target: got {target!r}, wanted 'pooled' or 'worst'")
-    return Budget(
-        samples=given["samples"] if named else usual, error=given["error"], seconds=given["seconds"], target=target
-    )
+    return Budget(samples=given["samples"] if named else usual, error=given["error"], seconds=given["seconds"])

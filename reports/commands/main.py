@@ -124,7 +124,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
         shown = each.replace(kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default)
         (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}
-    if function not in (view, run_tests) and endings != STUDY_ENDINGS:
+    if function not in (view, run_tests, export) and endings != STUDY_ENDINGS:
         extra["json"] = _JSON
     for name, annotation in extra.items():
         default = () if name == "output" else False

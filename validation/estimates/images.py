@@ -20,7 +20,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +47,6 @@ _MOST_BATCHES = 1 << 16  # of a run without a given number of samples; there are
 _LARGEST_TRACE = 1 << 22  # samples of one batch of such a run: so that it ends near its target
 _FLOOR = 1e-3
 
-Target = Literal["pooled", "worst"]
-
 
 @dataclass(frozen=True)
 class Budget:
@@ -59,9 +56,8 @@ class Budget:
     """
 
     samples: int | None = None  #: a pixel, at least
-    error: float | None = None  #: relative standard error
+    error: float | None = None  #: relative standard error of all pixels together
     seconds: float | None = None  #: of the whole run; batches from the cache cost next to nothing
-    target: Target = "pooled"  #: which error
 
     def __post_init__(self) -> None:
         given = {"--samples": self.samples, "--error": self.error, "--seconds": self.seconds}
@@ -98,7 +94,7 @@ class MonteCarloReference:
     """A reference by random samples, and how it came about."""
 
     image: Image  #: layers with their standard errors
-    errors: dict[Target, float]
+    errors: dict[str, float]
     reached: bool | None  #: whether the target error was reached; None if none was set
     masked: int  #: pixels beside a light, whose airlight is left out of `errors`
     cached: int  #: batches that were in the cache
@@ -149,7 +145,7 @@ def monte_carlo_reference(
         elsewhere=elsewhere,
     )
     errors = relative_errors(run.batches, near)
-    reached = None if budget.error is None else errors[budget.target] <= budget.error
+    reached = None if budget.error is None else errors["pooled"] <= budget.error
     image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
     if seen is not None:
         transmittance = seen.transmittance.reshape(*shape, 3)
@@ -185,10 +181,10 @@ class _Watch:
     def enough(self, batches: Batches) -> bool:
         """Say whether the target is reached; expect the error to fall with the square root of the batches."""
         assert self._budget.error is not None
-        error = relative_errors(batches, self._near)[self._budget.target]
+        error = relative_errors(batches, self._near)["pooled"]
         done = len(batches.seeds)
         self._expected = max(LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2))
-        self._words = f", {self._budget.target} error {error:.3g} of {self._budget.error:.3g}"
+        self._words = f", pooled error {error:.3g} of {self._budget.error:.3g}"
         return done >= LEAST_BATCHES and error <= self._budget.error
 
     def go_on(self, done: int) -> bool:
@@ -245,7 +241,7 @@ def _power_of_two(number: int) -> int:
     return 1 << (max(1, number).bit_length() - 1)
 
 
-def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> dict[Target, float]:
+def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> dict[str, float]:
     """Return the relative standard errors [1] of some batches, less the airlight of pixels `near` a light, (pixels,).
 
     See the module: 'pooled' is that of the sum of all pixels' errors, the largest of all layers and channels, 'worst'
