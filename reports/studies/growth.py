@@ -116,7 +116,7 @@ def _draw_scaling(records: list[Any], column: str) -> Any:
         panel.legend(loc="best")
     for panel in panels[len(kinds) :]:
         panel.remove()
-    figure.suptitle(", ".join(dict.fromkeys(record["scene"] for record in records)))
+    figure.suptitle(", ".join(dict.fromkeys(record.scene for record in records)))
     return figure
 
 

@@ -69,12 +69,14 @@ def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
     assert (tmp_path / "parts.png").stat().st_size > 10_000
 
 
-def test_scaling_that_jumps_ends_with_1(variant, capfd, monkeypatch):
+def test_scaling_that_jumps_ends_with_1_and_is_drawn(variant, capfd, monkeypatch, tmp_path):
     arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed", "--size", "80x60"]
+    arguments += ["-o", str(tmp_path / "growth.png")]
     for jump, status in ((False, 0), (True, 1)):
         found = growth_record(cliff=jump) | {"scene": "sphere-spot"}
         monkeypatch.setattr("validation.study.growth.study_growth", lambda *given, found=found, **options: [found])
         assert printed(capfd, *arguments, status=status)["scaling"] == [found]
+        assert (tmp_path / "growth.png").stat().st_size > 1000
 
 
 def test_maps_print_errors_by_size(variant, capfd):
