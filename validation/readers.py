@@ -4,12 +4,24 @@
 A reader returns the value, or raises InputError with what was given and what is wanted.
 """
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from analytic.errors import InputError, nearest
 
 Reader = Callable[[str, Any], Any]
+
+
+def read_toml(what: str, path: Path) -> dict[str, Any]:
+    """Return what a TOML file holds."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{what}: there is no file {path}; wanted a TOML file, see docs/many-scenes.md") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{what} {path}: it cannot be read: {error}") from error
 
 
 def read_table(what: str, value: Any) -> Mapping[str, Any]:

@@ -13,7 +13,6 @@ list by frame of matrices, 4 x 4, that take it from its place in the scene [m].
 """
 
 import json
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -29,6 +28,7 @@ from validation.readers import Reader, by_name, read_list, read_number, read_wor
 SCHEMA = "airlight-frames/1"
 _MARK = "#"
 _MOST = 1_000_000_000
+_number = partial(read_number, least=-1e30, most=1e30, whole=False)
 _FARTHEST = 1.0  # that rays are jittered [pixels]: what is more is in other units, of the film or of its half
 
 
@@ -119,18 +119,6 @@ def frame_paths(pattern: str | os.PathLike[str], record: FramesRecord, about: st
     return tuple(paths)
 
 
-def _number(what: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{what}: got {value!r}, wanted a finite number")
-    return float(value)
-
-
-def _positive(what: str, value: Any) -> float:
-    if _number(what, value) <= 0:
-        raise InputError(f"{what}: got {value!r}, wanted a number above 0")
-    return float(value)
-
-
 def _by_frame(read: Reader) -> Reader:
     return lambda what, value: tuple(read(f"{what}[{n}]", each) for n, each in enumerate(read_list(what, value, 0)))
 
@@ -167,7 +155,7 @@ _KINDS: dict[str, Reader] = {
     "frames": partial(read_number, least=2, most=_MOST),
     "scene": read_word,
     "first": partial(read_number, least=0, most=_MOST),
-    "fps": _positive,
+    "fps": partial(read_number, least=1e-6, most=_MOST, whole=False),
     "exposure": _stops,
     "layer": read_word,
     "pixel": read_word,

@@ -27,7 +27,6 @@ before any work. What a report measures is a study too (`validation/study/studie
 """
 
 import itertools
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
@@ -46,6 +45,7 @@ from validation.readers import (
     read_number,
     read_one_of,
     read_table,
+    read_toml,
     read_word,
     several,
 )
@@ -239,13 +239,7 @@ def read_study(path: Path) -> Study:
 
     Every name, type or value that a study cannot have is refused.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-        data = tomllib.loads(text)
-    except FileNotFoundError:
-        raise InputError(f"study: there is no file {path}; wanted a TOML file, see docs/many-scenes.md") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"study {path}: it cannot be read: {error}") from error
+    data = read_toml("study", path)
     try:
         study = parse_study(data, folder=path.parent, name=path.stem)
         if not study.scene_count:

@@ -14,7 +14,7 @@ import math
 import tomllib
 import zlib
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from analytic.errors import InputError, nearest
+from analytic.errors import InputError
+from validation.readers import Reader, read_named, read_number, read_table, read_toml
 
 FILE = Path(__file__).with_name("ranges.toml")  #: of ranges as they are drawn without a file of one's own
 
@@ -36,6 +37,7 @@ _SAFE = "/:\\"  # what stands in a path as it is, besides letters, digits, '_', 
 COORDINATES: tuple[str, ...] = tuple(tomllib.loads(FILE.read_text(encoding="utf-8"))["coordinates"])
 _SCRAMBLING = 2417
 LARGEST_SEED = 10**9
+_HEAVIEST = 1e9  # weight of a choice
 
 
 class Draws:
@@ -117,12 +119,7 @@ def _defaults() -> tuple[Ranges, Mapping[str, tuple[float, float]]]:
 
 def read_ranges(path: Path) -> Ranges:
     """Read ranges from a TOML file, whose folder of meshes lies beside it."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"ranges: cannot read {path}: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"ranges: {path} is no TOML: {error}") from error
+    table = read_toml("ranges", path)
     if isinstance(table.get("meshes"), str) and table["meshes"]:
         table["meshes"] = str(path.parent / table["meshes"])
     return ranges_from(table, str(path))
@@ -134,43 +131,35 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
     Unknown names, ranges that are empty or beyond what can be drawn, and weights of which none is above 0 are refused.
     """
     usual, limits = _defaults()
-    changed: Ranges = {}
-    for name, value in table.items():
-        if name not in usual:
-            raise InputError(f"{where}: got {name!r}, wanted some of {', '.join(usual)}{nearest(name, usual)}")
-        if name in limits:
-            changed[name] = _checked_range(f"{where}: {name}", value, *limits[name])
-        elif name != "meshes":
-            changed[name] = _checked_weights(f"{where}: {name}", value, tuple(usual[name]))
-        elif not isinstance(value, str) or (value and not Path(value).is_dir()):
-            raise InputError(f"{where}: {name} is {value!r}; wanted a folder of .obj and .ply files")
-        else:
-            changed[name] = value
-    return usual | changed
+    readers: dict[str, Reader] = {"meshes": _folder}
+    readers |= {name: partial(_range, limits=pair) for name, pair in limits.items()}
+    readers |= {name: partial(_weights, names=tuple(usual[name])) for name in usual if name not in readers}
+    try:
+        return usual | read_named("", table, readers)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
-def _checked_range(where: str, value: Any, least: float, most: float) -> tuple[float, float]:
+def _folder(what: str, value: Any) -> str:
+    if not isinstance(value, str) or (value and not Path(value).is_dir()):
+        raise InputError(f"{what} is {value!r}; wanted a folder of .obj and .ply files")
+    return value
+
+
+def _range(what: str, value: Any, *, limits: tuple[float, float]) -> tuple[float, float]:
     pair = value if isinstance(value, list | tuple) else [value, value]
-    if len(pair) != 2 or not all(_is_number(each) for each in pair) or not least <= pair[0] <= pair[1] <= most:
-        raise InputError(f"{where} is {value!r}; wanted [from, to], two numbers from {least:g} to {most:g}")
-    return float(pair[0]), float(pair[1])
+    found = tuple(float(read_number(what, each, *limits, whole=False)) for each in pair)
+    if len(found) != 2 or found[0] > found[1]:
+        raise InputError(f"{what}: got {value!r}, wanted [from, to]")
+    return found[0], found[1]
 
 
-def _checked_weights(where: str, value: Any, names: tuple[str, ...]) -> dict[str, float]:
-    if not isinstance(value, Mapping):
-        raise InputError(f"{where} is {value!r}; wanted a table of weights, such as {{ {names[0]} = 1 }}")
-    for name, weight in value.items():
-        if name not in names:
-            raise InputError(f"{where}: got {name!r}, wanted some of {', '.join(names)}{nearest(name, names)}")
-        if not _is_number(weight) or weight < 0:
-            raise InputError(f"{where}: {name} has the weight {weight!r}; wanted a number of 0 or more")
-    if not any(value.values()):
-        raise InputError(f"{where}: no weight is above 0; wanted one at least")
-    return {name: float(value.get(name, 0.0)) for name in names}
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, float]:
+    read = partial(read_number, least=0, most=_HEAVIEST, whole=False)
+    weights = read_named(f"{what}.", read_table(what, value), dict.fromkeys(names, read))
+    if not any(weights.values()):
+        raise InputError(f"{what}: no weight is above 0; wanted one at least")
+    return {name: float(weights.get(name, 0.0)) for name in names}
 
 
 # Names --------------------------------------------------------------------------------------------------------------

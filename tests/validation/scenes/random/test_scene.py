@@ -112,11 +112,12 @@ def test_what_is_set_is_drawn():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"optical_dept": [1, 2]}, "got 'optical_dept', wanted some of scale, .*did you mean 'optical_depth'"),
-        ({"fov": [50, 20]}, r"fov is \[50, 20\]; wanted \[from, to\], two numbers from 1 to 160"),
-        ({"light_kinds": {"laser": 1}}, "got 'laser', wanted some of point, spot"),
+        ({"optical_dept": [1, 2]}, "got optical_dept, wanted one of .*did you mean 'optical_depth'"),
+        ({"fov": [50, 20]}, r"fov: got \[50, 20\], wanted \[from, to\]"),
+        ({"fov": [50, 200]}, "fov: got 200, wanted a number from 1 to 160"),
+        ({"light_kinds": {"laser": 1}}, "got light_kinds.laser, wanted one of point, spot"),
         ({"light_kinds": {"point": 0}}, "no weight is above 0"),
-        ({"light_kinds": {"point": -1}}, "point has the weight -1; wanted a number of 0 or more"),
+        ({"light_kinds": {"point": -1}}, "light_kinds.point: got -1, wanted a number from 0 to"),
         ({"meshes": "/nowhere/at/all"}, "wanted a folder of .obj and .ply files"),
     ],
 )
