@@ -11,7 +11,7 @@ be missing. An x1 of `inf` is a ray that never ends.
 """
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
-from analytic.phase import phase_from_words
+from analytic.phase import PhaseFunction, phase_from_words
 
 Array = NDArray[np.float64]
 
@@ -144,16 +144,17 @@ def _checked(table: "_Table", rows: tuple[tuple[str, ...], ...] = ()) -> Cases:
     )
 
 
-def integrate_cases(cases: Cases, *, rtol: float = 1e-10) -> tuple[Array, Array]:
+def integrate_cases(cases: Cases, *, rtol: float = 1e-10, table: Sequence[float] | None = None) -> tuple[Array, Array]:
     """Return J and its error estimate [1/m] for every case, (cases,), by `analytic.panels.airlight_segments`.
 
-    `rtol` is the relative error asked for [1].
+    `rtol` is the relative error asked for [1], `table` has the values of the phase function 'tabulated'.
     """
     value, error = np.empty(len(cases.phase)), np.empty(len(cases.phase))
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
         rows = np.flatnonzero((np.array(cases.phase) == name) & (cases.g == g))
         columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
-        value[rows], error[rows] = airlight_segments(*columns, phase_from_words(name, g=g), rtol=rtol)
+        phase = PhaseFunction(name, table=table) if name == "tabulated" else phase_from_words(name, g=g)
+        value[rows], error[rows] = airlight_segments(*columns, phase, rtol=rtol)
     return value, error
 
 

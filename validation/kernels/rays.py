@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from analytic.panels import airlight_segments
-from analytic.phase import PHASE_NAMES, PhaseFunction, phase_from_words
+from analytic.phase import PHASE_NAMES
 from reference.storage.kept import kept, key_of
-from validation.kernels.case_files import Cases
+from validation.kernels.case_files import Cases, integrate_cases
 from validation.kernels.cases import TABLE
 
 Array = NDArray[np.float64]
@@ -118,14 +117,7 @@ def case_row(cases: Cases, k: int) -> str:
 
 
 def _reference(cases: Cases) -> Array:
-    value = np.empty(len(cases.x0))
-    names = np.asarray(cases.phase)
-    for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
-        rows = np.flatnonzero((names == name) & (cases.g == g))
-        phase = PhaseFunction(name, table=TABLE) if name == "tabulated" else phase_from_words(name, g=g)
-        columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
-        value[rows], _ = airlight_segments(*columns, phase, rtol=1e-12)
-    return value
+    return integrate_cases(cases, rtol=1e-12, table=TABLE)[0]
 
 
 def _sobol(count: int, dimensions: int) -> Array:

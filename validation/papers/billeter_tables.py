@@ -13,7 +13,6 @@ and the signed sum.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -28,9 +27,8 @@ from realtime.frame.renderer import Frame, FrameRenderer, render_frame, run_cast
 from realtime.methods.light_volumes.published.mesh import tessellation_stages
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import ReferenceScene, read_reference
 from validation.clock import time_repeated, timed
+from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.registry import SCENES
@@ -71,7 +69,8 @@ def _images(size: tuple[int, int]) -> dict[str, Any]:
     for scene_name in dict.fromkeys(scene_name for scene_name, *_ in IMAGES.values()):
         loaded = load_scene(scene_name, size).scene
         scene = read_scene(loaded)
-        true = quadrature_image(sampled_reference(read_reference(loaded), stride)).airlight
+        chosen = sampled(np.arange(size[0] * size[1]).reshape(size[::-1]), stride)
+        true = reference_of_pixels(loaded, chosen.ravel()).airlight.reshape(*chosen.shape, 3)
         for name, (where, method, values) in IMAGES.items():
             if where == scene_name:
                 renderer = partial(prepared, scene, configuration(method, "exact", values))
@@ -89,16 +88,9 @@ def _rate(renderer: FrameRenderer) -> list[float]:
     return time_repeated(moved_light(renderer), seconds=_SECONDS, least=3).rate
 
 
-def sampled(image: Array, stride: int) -> Array:
+def sampled(image: NDArray[Any], stride: int) -> NDArray[Any]:
     """Return one pixel in `stride` along both axes of an image, beginning at the middle of the first block."""
     return image[stride // 2 :: stride, stride // 2 :: stride]
-
-
-def sampled_reference(truth: ReferenceScene, stride: int) -> ReferenceScene:
-    """Return the scene with the rays of only those pixels that `sampled` takes."""
-    direction = sampled(truth.direction.reshape(truth.height, truth.width, 3), stride)
-    height, width, _ = direction.shape
-    return replace(truth, width=width, height=height, direction=direction.reshape(-1, 3))
 
 
 def _table(size: tuple[int, int], maps: tuple[int, ...]) -> dict[str, Any]:
