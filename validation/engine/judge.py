@@ -327,9 +327,9 @@ def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[st
     if nearest == judged.holds or not GAIN**2 * errors[nearest] < min(errors[judged.holds], powers[nearest]):
         return ()
     if nearest == TOTAL:
-        return ("the image is all light: say --holds total",)
+        return (f"the image is all light: say --layer {judged.name}=total",)
     channels = ", ".join(f"{nearest}.{channel}" for channel in "RGB")
-    return (f"the image is the {nearest} alone: name its channels {channels}, or say --holds {nearest}",)
+    return (f"the image is the {nearest} alone: name its channels {channels}, or say --layer {judged.name}={nearest}",)
 
 
 def _mean_square(values: NDArray[np.floating]) -> float:
