@@ -56,26 +56,27 @@ BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]
 GOALS = (0.05, 0.01, 0.002)  #: relative errors whose time is told
 _LOW = 0.125  # cycles a pixel
 _DOUBTFUL = 0.01  # of the sum of squares: a single value from which on the interval may not hold, see the module
+_NO_NOISE = Estimate(0.0, 0.0)
 _POWER, _LEVEL = 0.9, 0.05  # with which a bias is detected
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Noise:
     """What independent renders of a frame are like; everything is relative to the mean of the reference."""
 
     runs: int
     bias: Estimate
     bias_ci: tuple[float, float]  #: 95 %
-    detectable_bias: float  #: that would be found nine times of ten
+    detectable_bias: float = 0.0  #: that would be found nine times of ten
     squared_bias: Estimate
-    variance: Estimate
+    variance: Estimate = _NO_NOISE
     relative_rmse: float  #: of one run, root of the mean over runs
-    largest_deviation: float  #: of a single value from its mean over the runs
-    largest_share: float  #: of that in the sum of squared deviations
-    spectrum: tuple[float, ...]  #: by ring
-    low_share: float
+    largest_deviation: float = 0.0  #: of a single value from its mean over the runs
+    largest_share: float = 0.0  #: of that in the sum of squared deviations
+    spectrum: tuple[float, ...] = ()  #: by ring
+    low_share: float = math.nan
     blurred_rmse: tuple[float, ...]  #: after each of `BLURS`
-    blur_gain: tuple[float, ...]
+    blur_gain: tuple[float, ...] = ()
     seconds: float | None = None  #: of a run [s]
 
     @property
@@ -193,16 +194,9 @@ def measure_error(reference: Array, image: Array, seconds: float | None = None) 
         runs=1,
         bias=Estimate(bias, 0.0),
         bias_ci=(bias, bias),
-        detectable_bias=0.0,
         squared_bias=Estimate(square, 0.0),
-        variance=Estimate(0.0, 0.0),
         relative_rmse=math.sqrt(square),
-        largest_deviation=0.0,
-        largest_share=0.0,
-        spectrum=(),
-        low_share=math.nan,
         blurred_rmse=tuple(math.sqrt(float(np.mean(_blurred(error, blur) ** 2))) for blur in BLURS),
-        blur_gain=(),
         seconds=seconds,
     )
 
