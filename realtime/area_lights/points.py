@@ -84,13 +84,13 @@ def _far_apart(points: int) -> NDArray[np.int64]:
     """Return 0 to points - 1 in the order of van der Corput's sequence."""
     bits = max(1, (points - 1).bit_length())
     number = np.arange(2**bits, dtype=np.uint32)
-    order = (_reversed(number) >> np.uint32(32 - bits)).astype(np.int64)
+    order = (bit_reversed(number) >> np.uint32(32 - bits)).astype(np.int64)
     return order[order < points]
 
 
 def _sobol(points: int) -> Array:
     index = np.arange(points, dtype=np.uint32)
-    first = _reversed(index)
+    first = bit_reversed(index)
     second, direction = np.zeros_like(index), 1 << 31
     for bit in range(32):
         second ^= np.where(index >> np.uint32(bit) & np.uint32(1), np.uint32(direction), np.uint32(0))
@@ -102,13 +102,13 @@ def _sobol(points: int) -> Array:
 def _scrambled(number, seed: int):
     """Return numbers after a nested uniform scrambling: each bit is flipped by a hash of the bits above it."""
     with np.errstate(over="ignore"):
-        x = _reversed(number) + np.uint32(seed)
+        x = bit_reversed(number) + np.uint32(seed)
         for factor in (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6):
             x ^= x * np.uint32(factor)
-    return _reversed(x)
+    return bit_reversed(x)
 
 
-def _reversed(number):
+def bit_reversed(number):
     """Return 32-bit numbers with their bits in reverse order."""
     x = number
     for shift, mask in ((16, 0x0000FFFF), (8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):

@@ -13,5 +13,4 @@ Read in this order:
 - `light_depths.py`: of clouds whose density differs from place to place the depths of all points from a sun, in a map;
 - `lit_surface.py`: where that density first exceeds a threshold, from the eye and from the sun;
 - `collector_search.py`: where the light of a set of orders enters a cloud, and how much of it comes;
-- `order_layers.py`: the names of the layers of an image by order.
 """

@@ -41,9 +41,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical.coordinates import slab_phase
+from realtime.clouds.canonical.coordinates import FIRST_ORDERS, ORDER_LAYERS, slab_phase
 from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
-from realtime.clouds.order_layers import FIRST_ORDERS, ORDER_LAYERS
 from realtime.clouds.single_scattering import CloudRays, opacity_of
 from realtime.clouds.slab_orders.depth_panels import Transport, depth_panels
 from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel

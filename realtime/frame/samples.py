@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from realtime.area_lights.points import bit_reversed
 from realtime.errors import InputError
 from realtime.frame.renderer import Frame, FrameRenderer, render_frame
 from realtime.scene.camera import shifted_camera
@@ -28,10 +29,10 @@ def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:
     """
     if samples < 1:
         raise InputError(f"samples: got {samples}, wanted 1 or more")
-    down = [_radical_inverse(number) for number in range(samples)]
-    middle = sum(down) / samples
+    down = bit_reversed(np.arange(samples, dtype=np.uint32)) / 2.0**32
+    middle = down.mean()
     for number in range(samples):
-        yield (number + 0.5) / samples - 0.5, down[number] - middle
+        yield (number + 0.5) / samples - 0.5, float(down[number] - middle)
 
 
 def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[float], None] | None = None) -> Frame:
@@ -58,13 +59,3 @@ def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[fl
 
 def _sum(frame: Frame, airlight, surface) -> Frame:
     return replace(frame, airlight=frame.airlight + airlight, surface=frame.surface + surface)
-
-
-def _radical_inverse(number: int) -> float:
-    """Return the binary digits of a number mirrored at the point."""
-    inverse, place = 0.0, 0.5
-    while number:
-        number, digit = divmod(number, 2)
-        inverse += digit * place
-        place /= 2
-    return inverse

@@ -36,7 +36,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
-from realtime.clouds.canonical.coordinates import SETS, share_of_peak, slab_phase
+from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, share_of_peak, slab_phase
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
@@ -51,7 +51,6 @@ from realtime.clouds.light_maps import (
 )
 from realtime.clouds.lit_surface import dense_surface, lit_dense_surface
 from realtime.clouds.march import leg_by_lengths, leg_through
-from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering import (
     Beam,
     CloudRays,
@@ -291,8 +290,7 @@ def _collected(view: View, state: CloudState, parameters: CloudCollectors) -> La
             by_set = [sum_ + part for sum_, part in zip(by_set, of_sky)]
     opacity = _opacity(view, state, rays, parameters)
     layers = _with_opacity(view, state, rays, sum(by_set), opacity)
-    names = (order_layer(first) for first in (1, *(int(first) for first, _ in SETS)))
-    extra = dict(zip(names, by_set)) | {OPACITY: opacity} if view.extra_layers else None
+    extra = dict(zip(ORDER_LAYERS, by_set)) | {OPACITY: opacity} if view.extra_layers else None
     return replace(layers, extra=extra, carried=tuple(kept) if parameters.carries else None)
 
 

@@ -21,9 +21,9 @@ import drjit as dr
 import numpy as np
 
 from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
+from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.light_depths import LightDepths, sun_depths
 from realtime.clouds.march import leg_by_lengths, leg_through
-from realtime.clouds.order_layers import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.single_scattering import Beam, cloud_rays, light_on_surfaces, light_once, opacity_of, sky_behind
 from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError

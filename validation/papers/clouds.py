@@ -19,9 +19,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical.coordinates import SETS
+from realtime.clouds.canonical.coordinates import SETS, order_layer
 from realtime.clouds.collector_search import Collector
-from realtime.clouds.order_layers import order_layer
 from realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
 from realtime.methods.registry import METHODS
 from realtime.scene.mesh_adjacency import mesh_triangles

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The coordinates of the canonical transport, and which factors of the light of a slab its grid leaves out.
 
-**The eight sets of orders of Bouthors 2008, section 5.1**; order 1 stands apart.
+**The eight sets of orders of Bouthors 2008, section 5.1**, and the layers of images by set; order 1 stands apart.
 
 **The phase function scattered n times**, P_s: the mean over the orders of a set.
 
@@ -33,6 +33,7 @@ linear within each of the simplices of a cell, and continuous: n + 1 entries, wh
 """
 
 import math
+from bisect import bisect_right
 from typing import Any
 
 import drjit as dr
@@ -65,6 +66,18 @@ def set_name(number: int) -> str:
     if first == last:
         return str(first)
     return f"{first}-{int(last)}" if math.isfinite(last) else f"{first}-inf"
+
+
+#: The first order of each layer of an image by order of scattering: order n is light that was scattered n times.
+FIRST_ORDERS = (1, *(int(first) for first, _ in SETS))
+#: The layers, 'airlight_1', 'airlight_2', 'airlight_3_4', .. 'airlight_31_inf'; the airlight is their sum.
+ORDER_LAYERS = ("airlight_1", *("airlight_" + set_name(number).replace("-", "_") for number in range(len(SETS))))
+OPACITY = "opacity"  #: 1 less the transmittance of the clouds up to the surface, or to infinity
+
+
+def order_layer(order: int) -> str:
+    """Return the layer of an `order`, 1 or more."""
+    return ORDER_LAYERS[bisect_right(FIRST_ORDERS, order) - 1]
 
 
 Array = NDArray[Any]

@@ -6,9 +6,7 @@ The source prints no equation; what is built here is reconstructed from captions
 Read in this order:
 
 - `parameters.py`: the parameters, and which of them are those of the source.
-- `light_sources.py`: the points of a light as a table, with their shadow maps.
-- `march.py`: the airlight of all points of a light along rays.
+- `march.py`: the points of a light as a table, with their shadow maps, and their airlight along rays.
 - `surfaces.py`: which share of a light reaches the visible surfaces, and how wide its penumbrae are.
-- `smoothing.py`: the filters that the parameters ask for.
-- `method.py`: the method, and how its stages follow one another.
+- `method.py`: the method, how its stages follow one another, and its filters.
 """

@@ -22,6 +22,7 @@ Lights without extent are one point. Their surfaces are lit by shadow rays and h
 media every point of a light is asked, also with `interleave`.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -30,13 +31,22 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.errors import InputError
-from realtime.image_filters import Raster, depth_guide, separable, small_pixels, tile_average, upsample
+from realtime.image_filters import (
+    Guide,
+    Raster,
+    airlight_guide,
+    bilateral,
+    bilateral_of_levels,
+    depth_guide,
+    separable,
+    small_pixels,
+    tile_average,
+    upsample,
+)
 from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.method import Layers, View
-from realtime.methods.soft_shafts.light_sources import SourceState, source_state
-from realtime.methods.soft_shafts.march import Share, integral_of_points
+from realtime.methods.soft_shafts.march import Share, SourceState, integral_of_points, source_state
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
-from realtime.methods.soft_shafts.smoothing import smooth_airlight, smooth_share
 from realtime.methods.soft_shafts.surfaces import (
     AUTO_WIDTH,
     AUTO_WIDTH_SHARED,
@@ -153,7 +163,7 @@ class _Frame:
             integral = integral_of_points(few, self.states[number], len(lights), share, p)
             if share is not None:
                 integral = tile_average(integral, self.few_raster, guides=(self.few_depth,))
-        integral = smooth_airlight(integral, self.few_raster, depth=self.few_depth, p=p)
+        integral = _smooth_airlight(integral, self.few_raster, depth=self.few_depth, p=p)
         dr.eval(integral, self.few_depth)
         if p.scale == 1:
             integral = dr.gather(type(integral), integral, view.pixel)
@@ -197,7 +207,7 @@ class _Frame:
             lit = self._smooth_by_width(lit, width, len(lights))
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
-            lit = smooth_share(lit, self.raster, there=there, depth=self.depth, points=len(lights), levels=levels, p=p)
+            lit = _smooth_share(lit, self.raster, there=there, depth=self.depth, points=len(lights), levels=levels, p=p)
         lit = dr.clip(lit, 0, 1)
         dr.eval(lit)
         lit = dr.gather(type(lit), lit, view.pixel)
@@ -276,3 +286,39 @@ def _nearer(state: SourceState, place: int, point: Any) -> Any:
     local = frame.local(point - frame.position)
     assert isinstance(state.maps, HemisphereMaps)
     return state.maps.lit(mi.UInt32(place), local)
+
+
+def _smooth_share(
+    share: Any, raster: Raster, *, there: Any, depth: Guide, points: int, levels: bool, p: SoftShaftsParameters
+) -> Any:
+    """Return the share of a light that reaches the surfaces, filtered.
+
+    `share`: from 0 to 1, row by row; `raster`: the image; `there`: where there are surfaces: the sky takes no part;
+    `depth`: the guide of their depth; `points`, `levels`: N, and whether the share has N + 1 levels; `p`: the
+    parameters, with a filter whose `hd` is a number.
+    """
+    if p.filter == "gauss" or p.guide == "self":
+        hr = math.inf if p.filter == "gauss" else p.hr
+        if levels:
+            return bilateral_of_levels(share, raster, levels=points, hd=p.width, hr=hr, there=there)
+        # The sky is unlike all surfaces.
+        sky = Guide(dr.select(there, type(share)(0), 1), 1e-3)
+        guides = (sky,) if math.isinf(hr) else (sky, Guide(share, hr))
+        return _filtered(share, raster, guides, p.width)
+    return _filtered(share, raster, (depth,), p.width)
+
+
+def _smooth_airlight(integral: Any, raster: Raster, *, depth: Guide, p: SoftShaftsParameters) -> Any:
+    """Return airlight filtered; `hd` counts pixels of the full image, whatever the scale of this one."""
+    if p.filter == "none" or p.hd == AUTO:
+        return integral
+    guides: tuple[Guide, ...] = ()
+    if p.filter == "bilateral" and p.guide == "depth":
+        guides = (depth,)
+    elif p.filter == "bilateral" and not math.isinf(p.hr):
+        guides = (airlight_guide(integral, p.hr),)
+    return _filtered(integral, raster, guides, p.width / p.scale)
+
+
+def _filtered(image: Any, raster: Raster, guides: tuple[Guide, ...], hd: float) -> Any:
+    return (bilateral if guides else separable)(image, raster, hd=hd, guides=guides)

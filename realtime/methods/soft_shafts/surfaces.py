@@ -23,7 +23,7 @@ import mitsuba as mi
 
 from realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
 from realtime.methods.interface.method import View
-from realtime.methods.soft_shafts.light_sources import SourceState
+from realtime.methods.soft_shafts.march import SourceState
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.camera import Camera

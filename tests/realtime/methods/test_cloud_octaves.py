@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.order_layers import OPACITY
+from realtime.clouds.canonical.coordinates import OPACITY
 from realtime.errors import InputError
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame, render_frame

@@ -5,7 +5,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.methods.soft_shafts.light_sources import source_state
+from realtime.methods.soft_shafts.march import source_state
 from realtime.scene.light_points import with_light_points
 from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import lamp_scene
