@@ -23,7 +23,7 @@ _SAMPLES = "reference.quadrature.light_samples"
 _WEIGHTED = "reference.quadrature.area_lights"
 _SHADOWS = "reference.visibility.shadows"
 _TRACED = "reference.monte_carlo.single_scatter"
-_ESTIMATOR, _EXTENDED = f"{_TRACED}.estimator", f"{_TRACED}.area_estimate"
+_ESTIMATOR, _SOURCES = f"{_TRACED}.estimator", f"{_TRACED}.sources"
 _FOUR_PI = 4 * np.pi
 
 
@@ -260,7 +260,7 @@ def _leg(change: Callable[..., Any]) -> Wrap:
 
 def _one_technique(function, u, mixture):
     y, s, _ = function(u, mixture)
-    return y, s, mi.Float(mixture_pdfs(mi.Float64(y), mixture)[0])
+    return y, s, mixture_pdfs(y, mixture)[0]
 
 
 def _equal_cells(function, number, shift, count):
@@ -268,12 +268,19 @@ def _equal_cells(function, number, shift, count):
     return low, mi.Float(1 / (count - 1))
 
 
-def _no_albedo(function, task, number, ray, stretch, *others):
-    return function(task, number, ray, replace(stretch, sigma_s=stretch.sigma_t), *others)
-
-
 def _clear_leg(function, *arguments, **named):
     return dr.select(function(*arguments, **named) > 0, mi.Spectrum(1), mi.Spectrum(0))
+
+
+#: The way from the camera to a sample left out, and the scattering angle turned round, whatever the light.
+_BRIGHT_CAMERA_LEG = Rewrite(
+    _ESTIMATOR, "part.kept(sample.x, a_, b_, c_, d_, e_)", "part.kept(part.start, a_, b_, c_, d_, e_)"
+)
+_TRACED_BACKWARD = Rewrite(
+    _ESTIMATOR,
+    "phase_.eval_pdf(context_, point_, sample.towards, on_)",
+    "phase_.eval_pdf(context_, point_, -sample.towards, on_)",
+)
 
 
 # --- Hooks of what all estimators share: the camera ---
@@ -437,25 +444,25 @@ _TRACED_FOG = _all(
         "free-flight-not-truncated": Rewrite(_TRACED, "flight_.rate * scale_ * survival_", "flight_.rate * survival_"),
         "no-weights": Wrap(f"{_TRACED}.distance_sampling:sample_distance", _one_technique),
         "equal-cells": Wrap(f"{_TRACED}.stretches:cell_of", _equal_cells),
-        "traced-distance-not-squared": Rewrite(_ESTIMATOR, "width_ / (r_ * r_ * density_)", "width_ / (r_ * density_)"),
+        "traced-distance-not-squared": Rewrite(
+            _SOURCES, "1 / (square_ * density_)", "1 / (dr.sqrt(square_) * density_)"
+        ),
         "traced-bright-shadow-leg": _leg(lambda media: replace(media, end_sigma_t=0 * media.end_sigma_t)),
-        "traced-bright-camera-leg": Rewrite(
-            _ESTIMATOR,
-            "sent_ * dr.exp(-camera_leg_) * (width_ / (r_ * r_ * density_))",
-            "sent_ * (width_ / (r_ * r_ * density_))",
-        ),
+        "traced-bright-camera-leg": _BRIGHT_CAMERA_LEG,
         "leg-before-the-cone-forgotten": Rewrite(
-            _ESTIMATOR, "mi.Float(start_ - first_)", "0 * mi.Float(start_ - first_)"
+            _SOURCES, "Sample(low_ + y_, a_, b_, c_, d_, e_)", "Sample(part.start + y_, a_, b_, c_, d_, e_)"
         ),
-        "traced-forward-is-backward": Rewrite(
+        "traced-forward-is-backward": _TRACED_BACKWARD,
+        "traced-extinction-for-scattering": Rewrite(
             _ESTIMATOR,
-            "phase_.eval_pdf(context_, point_, -light_, on_)",
-            "phase_.eval_pdf(context_, point_, light_, on_)",
+            "sigma_s_ * phase_ * sample.value * kept_ * width_",
+            "part.sigma_t * phase_ * sample.value * kept_ * width_",
         ),
-        "traced-extinction-for-scattering": Wrap(f"{_ESTIMATOR}:_scattered", _no_albedo),
-        "traced-surface-not-squared": Rewrite(_ESTIMATOR, "sent_ / (r_ * r_)", "sent_ / r_"),
+        "traced-surface-not-squared": Rewrite(
+            _SOURCES, "self.sent(light_, hit_, way_) / (r_ * r_)", "self.sent(light_, hit_, way_) / r_"
+        ),
         "traced-surface-bright-camera-leg": Rewrite(
-            _ESTIMATOR, "dr.select(on_, sent_ * dr.exp(-camera_leg), 0)", "dr.select(on_, sent_, 0)", times=2
+            _ESTIMATOR, "part.kept(x, hit, a_, b_, c_, d_)", "part.kept(part.start, hit, a_, b_, c_, d_)"
         ),
     },
 )
@@ -475,12 +482,8 @@ _TRACED_SUN = _all(
     {
         "traced-directional-uniform-density": Rewrite(_TRACED, "0.5 / length_ + share_ * sum(pdfs_)", "1 / length_"),
         "traced-directional-bright-leg": Wrap(f"{_TRACED}.boundary_walk:transmittance", _clear_leg),
-        "traced-directional-bright-camera-leg": Rewrite(_ESTIMATOR, "dr.exp(-depth_ - sigma_ * y_)", "dr.exp(-depth_)"),
-        "traced-directional-forward-is-backward": Rewrite(
-            _ESTIMATOR,
-            "phase_.eval_pdf(context_, point_, towards, on_)",
-            "phase_.eval_pdf(context_, point_, -towards, on_)",
-        ),
+        "traced-directional-bright-camera-leg": _BRIGHT_CAMERA_LEG,
+        "traced-directional-forward-is-backward": _TRACED_BACKWARD,
     },
 )
 
@@ -488,7 +491,9 @@ _TRACED_WIDE = _all(
     "single-scatter",
     "wide-lights",
     {
-        "traced-area-without-cosine": Rewrite(_EXTENDED, "width_ * cosine / all_", "width_ / all_"),
+        "traced-area-without-cosine": Rewrite(
+            _SOURCES, "self.light.radiance * (cosine_ / density_)", "self.light.radiance * (1 / density_)"
+        ),
         "traced-area-even-density": Rewrite(
             _TRACED, "dr.select(counts_, density, 0)", "dr.select(counts_, 1 / light.area, 0)"
         ),
@@ -504,19 +509,10 @@ _TRACED_WIDE = _all(
             f"{_TRACED}.area_sampling:AreaLight.area",
             lambda function, light: function(light) / (4 if light.shape == "Sphere" else 1),
         ),
-        "traced-area-bright-camera-leg": Rewrite(
-            _EXTENDED, "sent_ * dr.exp(-camera_leg_) * weight_", "sent_ * weight_"
-        ),
-        "traced-area-forward-is-backward": Rewrite(
-            _EXTENDED,
-            "phase_.eval_pdf(context_, point_, -light_, on_)",
-            "phase_.eval_pdf(context_, point_, light_, on_)",
-        ),
-        "traced-area-surface-without-cosine": Rewrite(
-            _EXTENDED, "cosine / (r_ * r_ * density_)", "1 / (r_ * r_ * density_)"
-        ),
+        "traced-area-bright-camera-leg": _BRIGHT_CAMERA_LEG,
+        "traced-area-forward-is-backward": _TRACED_BACKWARD,
         "traced-area-surface-wrong-count": Rewrite(
-            _EXTENDED, "value * left_(p_, w_, r_) / samples", "value * left_(p_, w_, r_) / (samples - 1)"
+            _ESTIMATOR, "material_ * irradiance_ * kept_ / count_", "material_ * irradiance_ * kept_ / (count_ - 1)"
         ),
     },
 )

@@ -8,7 +8,7 @@ from scipy.stats import t
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import merged
-from reference.monte_carlo.single_scatter.directional_sampling import sample_stretch
+from reference.monte_carlo.single_scatter.distance_sampling import sample_stretch
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.single_scatter.scene_data import read_task
 from reference.quadrature.image import quadrature_image

@@ -3,15 +3,14 @@
 
 Read in this order:
 
-- `distance_sampling.py`: distances along a ray: equi-angular and free-flight sampling combined;
-- `directional_sampling.py`: distances for directional lights: uniform and free-flight;
+- `distance_sampling.py`: distances along a ray: equi-angular, uniform and free-flight sampling combined;
 - `boundary_walk.py`: optical depth and visibility through the boundaries of media;
+- `stretches.py`: camera rays, their parts in media, cells of samples;
+- `height_fog.py`: parts in height fog, with optical depths of its own;
+- `density_grid.py`: parts in density grids, by ratio tracking;
 - `area_sampling.py`: lights with extent, and points on them;
-- `stretches.py`: camera rays, their stretches in one medium, cells of samples;
-- `height_fog.py`: the estimate in height fog, with optical depths of its own;
-- `density_grid.py`: the estimate in density grids, by ratio tracking;
+- `sources.py`: what samples receive of lights;
 - `scene_data.py`: what the integrator must know of a scene, read on its own;
-- `area_estimate.py`: the estimate under lights with extent;
 - `estimator.py`: the estimate of one camera ray;
 - `integrator.py`: its batches.
 """

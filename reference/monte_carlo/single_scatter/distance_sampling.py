@@ -27,6 +27,11 @@ Combined: the density is the mean of the two. The estimator f(y)/pdf(y) is then 
 finite for every ray that does not meet the light: f r^2 is bounded (by sigma_s I max p) and pdf r^2 >= h/(2 range),
 whatever the free-flight density and whatever channel f is of.
 
+Nothing falls with the distance to a light from infinity: what varies along a stretch of length d is exp(-sigma y) of
+the camera ray, the transmittance of the leg, which may fall or rise, and shadows. There the density is the mean of the
+uniform one, 1/d, and of free flights. Half of the unit interval goes to the former, half to the latter: with n samples
+in n cells either technique is stratified by itself. As the density is nowhere below 1/(2 d), the estimator is bounded.
+
 References
 ----------
 C. Kulla and M. Fajardo 2012, Importance sampling techniques for path tracing in participating media.
@@ -122,6 +127,12 @@ def equi_angular_range(span: Span):
 def equi_angular(u, span: Span):
     """Return distances y from the start of the span [m], uniform in the angle at the light, for u in [0, 1)."""
     return _distance(u * equi_angular_range(span), span)
+
+
+def equi_angular_pdf(y, span: Span):
+    """Return the density of `equi_angular` at y [1/m]."""
+    h, s = span.height, span.start + y
+    return h / (equi_angular_range(span) * (h * h + s * s))
 
 
 def _distance(angle, span: Span):
@@ -241,4 +252,21 @@ def sample_distance(u, mixture: Mixture) -> tuple[Any, Any, Any]:
     state = (mi.UInt32(0), dr.full(mi.Bool, True, dr.width(low)), low, high, 0.5 * (low + high))
     angle = dr.while_loop(state, lambda number, searching, *_: searching, improve, label="inverse of the mixture")[-1]
     y = _distance(angle, span)
-    return mi.Float(y), mi.Float(span.start + y), mi.Float(sum(mixture_pdfs(y, mixture)))
+    return y, span.start + y, sum(mixture_pdfs(y, mixture))
+
+
+def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:
+    """Sample a distance for a light from infinity, by the mean of the uniform density and of free flights.
+
+    `u`: uniform in [0, 1); `length`: of the stretch, finite and above 0 [m]; `sigma_t`: one extinction for all
+    channels, or one for each [1/m]. Returns distances from its start [m] and their density [1/m].
+    """
+    u, length = mi.Float64(u), mi.Float64(length)
+    flights = [free_flights(length, mi.Float64(rate)) for rate in sigma_t]
+    share = 0.5 / len(flights)
+    y = 2 * u * length
+    for number, flight in enumerate(flights):
+        low = 0.5 + number * share
+        y = dr.select(u >= low, free_flight(dr.clip((u - low) / share, 0, 1), flight), y)
+    y = dr.minimum(y, length)
+    return y, 0.5 / length + share * sum(free_flight_pdf(y, flight) for flight in flights)

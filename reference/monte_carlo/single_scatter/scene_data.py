@@ -5,16 +5,13 @@
 functions and media stay Mitsuba's own and are asked for their answers while rays are traced.
 """
 
-import math
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
-from reference.monte_carlo.single_scatter.area_sampling import AreaLight, is_area, read_area
 from reference.monte_carlo.single_scatter.boundary_walk import (
     Surroundings,
     coefficients,
@@ -22,18 +19,8 @@ from reference.monte_carlo.single_scatter.boundary_walk import (
     require_homogeneous,
 )
 from reference.monte_carlo.single_scatter.density_grid import read_majorant
-from reference.monte_carlo.single_scatter.directional_sampling import is_sky
 from reference.monte_carlo.single_scatter.height_fog import HeightDensity, read_height_density
-
-
-@dataclass(frozen=True)
-class Light:
-    """A light as far as sampling must know it; what it sends where is the emitter's answer."""
-
-    emitter: Any  #: Mitsuba's emitter
-    position: Any  #: of double precision [m]
-    axis: Any = None  #: spot: unit vector of double precision
-    cutoff: float = math.pi  #: spot: half angle of the cone [rad]
+from reference.monte_carlo.single_scatter.sources import FarSource, Source, is_sky, read_source
 
 
 @dataclass(frozen=True)
@@ -41,11 +28,9 @@ class Task:
     """What is fixed while a scene is traced."""
 
     around: Surroundings  #: what rays can meet
-    lights: tuple[Light, ...]  #: point and spot lights
-    far: tuple[Any, ...]  #: Mitsuba's emitters from infinity: suns, and a uniform sky
+    sources: tuple[Source, ...]  #: the lights
     samples: int  #: distances for each ray, light and medium
     grey: bool  #: no medium's extinction depends on the channel
-    area: tuple[AreaLight, ...] = ()  #: lights with extent
     fog: HeightDensity | None = None  #: what camera rays start in, where that is height fog
     majorant: float = 0.0  #: the largest extinction of what camera rays start in, where that is a density grid [1/m]
 
@@ -57,21 +42,20 @@ def read_task(scene, medium, samples: int) -> Task:
     vacuum; `samples`: distances for each ray, light and medium. Raises InputError for an emitter, a medium or a
     material that it has no answer for.
     """
-    far = tuple(emitter for emitter in scene.emitters() if _is_far(emitter))
-    area = tuple(read_area(emitter) for emitter in scene.emitters() if is_area(emitter))
-    lights = tuple(_read_light(emitter) for emitter in scene.emitters() if not (_is_far(emitter) or is_area(emitter)))
+    sources = tuple(read_source(emitter) for emitter in scene.emitters())
     around, media = read_surroundings(scene)
     own = medium if isinstance(medium, mi.Medium) else None
     fog, majorant = read_height_density(own) if own else None, read_majorant(own) if own else 0.0
     if fog is not None or majorant:
-        return Task(around, lights, far, samples, grey=True, area=area, fog=fog, majorant=majorant)
+        return Task(around, sources, samples, grey=True, fog=fog, majorant=majorant)
     if isinstance(medium, mi.Medium):
         require_homogeneous(medium)
         media = [*media, medium]
+    far = [source.emitter for source in sources if isinstance(source, FarSource)]
     if far:
         _refuse_endless(scene, medium, far[0])
     known = medium is None or isinstance(medium, mi.Medium)
-    return Task(around, lights, far, samples, grey=known and all(_is_grey(each) for each in media), area=area)
+    return Task(around, sources, samples, grey=known and all(_is_grey(each) for each in media))
 
 
 def _refuse_endless(scene, medium, emitter) -> None:
@@ -93,27 +77,7 @@ def _refuse_endless(scene, medium, emitter) -> None:
             )
 
 
-def _is_far(emitter) -> bool:
-    return is_sky(emitter) or str(emitter.class_name()) == "DirectionalEmitter"
-
-
 def _is_grey(medium) -> bool:
     _, sigma_t = coefficients(mi.MediumPtr(medium), mi.Bool(True))
     dr.eval(sigma_t)
     return len({float(np.ravel(channel)[0]) for channel in sigma_t}) == 1
-
-
-def _read_light(emitter) -> Light:
-    name = emitter.class_name()
-    if name not in ("PointLight", "SpotLight"):
-        raise InputError(
-            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional', "
-            "'area' or 'constant' only"
-        )
-    sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
-    position = mi.Point3d(sample.p)
-    if name == "PointLight":
-        return Light(emitter, position)
-    axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
-    cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
-    return Light(emitter, position, axis, math.radians(cutoff))

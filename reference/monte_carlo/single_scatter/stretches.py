@@ -1,11 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Camera rays and their stretches in one medium, and the cells of the unit interval that samples along them lie in."""
+"""Camera rays, their parts in media, ways from lights to points on them, and cells of samples.
 
+What a medium must say of its part of the rays is `Part`. A new medium is one more of these, in a file of its own.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
+
+from reference.monte_carlo.single_scatter.boundary_walk import Leg, Surroundings, medium_at, transmittance
+from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_of, sample_distance, sample_stretch
+
+_STEPS = (0.7548776662466927, 0.5698402909980532)  # 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly
 
 
 @dataclass(frozen=True)
@@ -19,23 +29,90 @@ class Ray:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Path:
+    """Straight ways from a light to points of camera rays or surfaces."""
+
+    begin: Any  #: on the light, or where it is infinitely far beyond all shapes [m]
+    away: Any  #: unit vectors from there
+    length: Any  #: [m]
+    end: Any = None  #: the points, where the light is infinitely far [m]
+    medium: Any = None  #: pointer to what they begin in; None: not known
+
+    def shadow_ray(self) -> tuple[Any, Any, Any]:
+        """Return from where rays look for what stands in the way, in which unit direction, and how far [m].
+
+        Rays from afar lose digits: a ball of 1 m, met from 200 m away, would shadow a third of itself.
+        """
+        if self.end is None:
+            return self.begin, self.away, self.length
+        return self.end, -self.away, self.length
+
+
+@dataclass(frozen=True)
+class Part(ABC):
     """The part of camera rays in one medium."""
 
-    start: Any  #: distance from the camera where it begins [m]
-    end: Any  #: where it ends, may be infinite [m]
-    depth: Any  #: optical depth from the camera to its start
+    around: Surroundings
+    start: Any  #: distance from the camera, of double precision [m]
+    end: Any  #: may be infinite [m]
     medium: Any  #: pointer
-    sigma_s: Any  #: [1/m]
+    scatters: Any  #: mask
+    estimated: ClassVar[bool] = False  #: whether `kept` is an estimate, from samples
+
+    @abstractmethod
+    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
+        """Sample distances from `low`, a distance along the rays, up to a length from there [m], in double precision.
+
+        `u` is uniform in [0, 1); `span`: the same part as a light at a place sees it, None for one that is infinitely
+        far. Returns distances [m] and their density [1/m].
+        """
+
+    @abstractmethod
+    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
+        """Return what is left of light that comes to points by paths, and to the camera from there, x [m] away.
+
+        Nothing is where something stands in a path. Returns the sampler, too.
+        """
+
+
+@dataclass(frozen=True)
+class Stretch(Part):
+    """The part of camera rays in one homogeneous medium."""
+
+    depth: Any  #: optical depth from the camera to its start
     sigma_t: Any  #: [1/m]
-    at_lights: tuple[Any, ...]  #: pointers to the media in which the point and spot lights are
+    rates: Sequence[Any]  #: the same, each once [1/m]
     at_camera: Any  #: pointer to the medium in which the camera is
+
+    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
+        """Sample distances by the mixture of techniques; see `Part`."""
+        if span is None:
+            return sample_stretch(u, length, self.rates)
+        y, _, density = sample_distance(u, mixture_of(span, self.rates))
+        return y, density
+
+    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
+        """Return the transmittance of both ways; see `Part`."""
+        at_light = path.medium
+        if path.end is not None or not self.around.bounded:
+            at_light = dr.zeros(mi.MediumPtr)  # beyond all shapes is clear air
+        elif at_light is None:
+            at_light = medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
+        media = Leg(at_light, self.sigma_t)
+        leg = transmittance(self.around, path.begin, path.away, path.length, media=media, active=active)
+        return leg * dr.exp(-self.depth - self.sigma_t * mi.Float(x - self.start)), sampler
 
 
 def double_ray(origin, direction) -> Ray:
     """Return rays given in double precision; their directions need not have unit length."""
     direction = dr.normalize(direction)
     return Ray(mi.Point3f(origin), dr.normalize(mi.Vector3f(direction)), origin, direction)
+
+
+def lit(around: Surroundings, path: Path, active):
+    """Return 1 where nothing stands in paths, 0 elsewhere."""
+    nothing = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
+    return transmittance(around, *path.shadow_ray(), media=nothing, active=active)
 
 
 def cell_of(number, shift, count: int) -> tuple[Any, Any]:
@@ -50,6 +127,13 @@ def cell_of(number, shift, count: int) -> tuple[Any, Any]:
     place = mi.Float(number) + shift
     low, high = dr.maximum(place - 1, 0), dr.minimum(place, count - 1)
     return low / (count - 1), (high - low) / (count - 1)
+
+
+def place_of(index, start) -> tuple[Any, Any]:
+    """Return a point of the unit square, given its number and where the sequence, Kronecker's, starts."""
+    number = mi.Float64(index)
+    u, v = (mi.Float64(begin) + number * step for begin, step in zip(start, _STEPS))
+    return u - dr.floor(u), v - dr.floor(v)
 
 
 def point_on(ray: Ray, position):

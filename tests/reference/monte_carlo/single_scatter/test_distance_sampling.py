@@ -18,7 +18,7 @@ from reference.monte_carlo.single_scatter.distance_sampling import (
     _terms,
     closest_approach,
     cone_ends,
-    equi_angular_range,
+    equi_angular_pdf,
     mixture_of,
     sample_distance,
 )
@@ -49,12 +49,6 @@ def _span(case):
 
 def _mixture(case):
     return mixture_of(_span(case), [dr.opaque(mi.Float64, rate) for rate in SPANS[case][3]])
-
-
-def equi_angular_pdf(y, span):
-    """Return the density of `equi_angular` at y [1/m]."""
-    s = span.start + y
-    return span.height / (equi_angular_range(span) * (span.height * span.height + s * s))
 
 
 def mixture_cdf(y, mixture):

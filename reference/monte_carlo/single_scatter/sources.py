@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Lights as the estimator asks them: what one sample on a camera ray, or one on a surface, receives.
+
+A light at a place sends the intensity I to a point at the distance r; a sample receives I/(r^2 density), the density
+that of the distances along the ray (`reference.monte_carlo.single_scatter.stretches.Part`). A light with extent has a
+point y of its own for each sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w
+the unit vector from y. Its plane clips the ray: what lies behind it gets no light from there. A sun and a sky have an
+irradiance, a sky a direction of its own for each sample. What a light sends where is the answer of Mitsuba's emitter,
+but for lights with extent, which are read again (`reference.monte_carlo.single_scatter.area_sampling`): nothing asks
+Mitsuba's `sample_direction` for these.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from analytic.errors import InputError
+from reference.monte_carlo.single_scatter.area_sampling import (
+    AreaLight,
+    LightPoint,
+    is_area,
+    read_area,
+    sample_evenly,
+    sample_point,
+)
+from reference.monte_carlo.single_scatter.boundary_walk import step_beyond
+from reference.monte_carlo.single_scatter.distance_sampling import Approach, Span, closest_approach, cone_ends
+from reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
+
+_LEAST_SLOPE = 1e-12  # of a ray against the plane of a light's point
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A distance along camera rays, and what comes there from a light."""
+
+    x: Any  #: [m], of double precision
+    point: Any  #: the point of the medium
+    towards: Any  #: unit vectors to the light
+    path: Path
+    value: Any  #: irradiance across the path, were nothing in its way, over the density of the sample
+    counts: Any  #: mask
+
+
+class _Near:
+    """Lights at places: a subclass has points, says what these send, and what part of a ray they could light."""
+
+    medium: Any = None  # pointer to what every path begins in, where that is known
+
+    def point(self, numbers, ray: Ray | None) -> LightPoint:
+        """Return the points of samples with these numbers, for surfaces where no ray is given."""
+        raise NotImplementedError
+
+    def sent(self, point: LightPoint, at, from_light) -> Any:
+        """Return the intensity towards places in unit directions, over the density of the points [W/sr]."""
+        raise NotImplementedError
+
+    def ends(self, point: LightPoint, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+        """Return the ends of the part of a line that the points could light, from the foot [m]."""
+        raise NotImplementedError
+
+    def on_ray(self, u, numbers, ray: Ray, part: Part, active) -> Sample:
+        """Return samples on rays, for `u` uniform in [0, 1) and `numbers` in the unit square."""
+        light = self.point(numbers, ray)
+        approach = closest_approach(ray.origin_double, ray.direction_double, light.position)
+        low, high = (approach.foot + end for end in self.ends(light, approach, ray))
+        low, high = dr.maximum(part.start, low), dr.minimum(part.end, high)
+        used = active & (high > low) & (light.density > 0)
+        low = dr.select(used, low, 0)
+        length = dr.select(used, high - low, 1)
+        span = Span(approach.height, low - approach.foot, length)
+        y, density = part.distances(u, low, length, span)
+        s = span.start + y
+        square = approach.height * approach.height + s * s
+        # All from the light on: a place close to it keeps its digits.
+        way = mi.Vector3f(approach.normal * approach.height + ray.direction_double * s)
+        from_light = way / mi.Float(dr.sqrt(square))
+        there = point_on(ray, mi.Point3f(light.position) + way)
+        used &= density > 0
+        value = self.sent(light, there, from_light) * mi.Float(dr.select(used, 1 / (square * density), 0))
+        return Sample(low + y, there, -from_light, self._path(light, way), value, used)
+
+    def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
+        """Return unit vectors to the light, paths, and the irradiance across them of surfaces."""
+        light = self.point(numbers, None)
+        way = hit.p - mi.Point3f(light.position)
+        r = dr.norm(way)
+        from_light = way / r
+        return -from_light, self._path(light, way), self.sent(light, hit, from_light) / (r * r)
+
+    def _path(self, light: LightPoint, way) -> Path:
+        """Return the paths from a hair before the light's own surface, if it has one."""
+        begin = mi.Point3f(light.position)
+        hair = mi.Vector3f(light.normal) * step_beyond(begin)
+        way = way - hair
+        length = dr.norm(way)
+        return Path(begin + hair, way / length, length, medium=self.medium)
+
+
+@dataclass(frozen=True)
+class PointSource(_Near):
+    """A point or spot light."""
+
+    emitter: Any  #: Mitsuba's
+    position: Any  #: of double precision [m]
+    axis: Any = None  #: spot: unit vector of double precision
+    cutoff: float = math.pi  #: spot: half angle of the cone [rad]
+    medium: Any = None  #: pointer to what it is in, where that is known
+    varies = False
+
+    def point(self, numbers, ray: Ray | None) -> LightPoint:
+        """Return its place, for every sample."""
+        return LightPoint(self.position, mi.Vector3d(0), mi.Float64(1))
+
+    def sent(self, point: LightPoint, at, from_light) -> Any:
+        """Return the intensity: the emitter's irradiance times the squared distance."""
+        sample, irradiance = self.emitter.sample_direction(at, mi.Point2f(0.5))
+        return irradiance * sample.dist * sample.dist
+
+    def ends(self, point: LightPoint, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+        """Return the ends of the part of a line in the cone."""
+        if self.axis is None:
+            return -dr.inf, dr.inf
+        return cone_ends(approach, ray.direction_double, axis=self.axis, cutoff=self.cutoff)
+
+
+@dataclass(frozen=True)
+class AreaSource(_Near):
+    """A light with extent."""
+
+    light: AreaLight
+    varies = True
+
+    def point(self, numbers, ray: Ray | None) -> LightPoint:
+        """Return points that are spread towards rays, or evenly over the area."""
+        if ray is None:
+            return sample_evenly(*numbers, self.light)
+        return sample_point(*numbers, self.light, origin=ray.origin_double, direction=ray.direction_double)
+
+    def sent(self, point: LightPoint, at, from_light) -> Any:
+        """Return the intensity of points."""
+        cosine = dr.maximum(dr.dot(mi.Vector3f(point.normal), from_light), 0)
+        density = dr.select(point.density > 0, point.density, 1)
+        return self.light.radiance * (cosine / mi.Float(density))
+
+    def ends(self, point: LightPoint, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+        """Return the ends of the part of a line before the plane of each point."""
+        slope = dr.dot(ray.direction_double, point.normal)
+        level = dr.dot(ray.origin_double - point.position, point.normal)
+        parallel = dr.abs(slope) < _LEAST_SLOPE
+        crossing = -level / dr.select(parallel, 1, slope) - approach.foot
+        low = dr.select(~parallel & (slope > 0), crossing, -dr.inf)
+        high = dr.select(~parallel & (slope < 0), crossing, dr.inf)
+        return low, dr.select(parallel & (level <= 0), -dr.inf, high)
+
+
+@dataclass(frozen=True)
+class FarSource:
+    """A sun, or a uniform sky, of which each sample asks in a direction of its own: evenly from the sphere.
+
+    The emitter names a place beyond everything, in clear air: there paths begin.
+    """
+
+    emitter: Any  #: Mitsuba's
+    position = None
+
+    @property
+    def varies(self) -> bool:
+        """Whether samples differ on one surface."""
+        return is_sky(self.emitter)
+
+    def on_ray(self, u, numbers, ray: Ray, part: Part, active) -> Sample:
+        """Return samples on rays; see `_Near`."""
+        length = part.end - part.start
+        used = active & (length > 0) & (length < dr.inf)
+        y, density = part.distances(u, part.start, dr.select(used, length, 1), None)
+        x = part.start + y
+        point = point_on(ray, ray.origin + ray.direction * mi.Float(x))
+        sample, irradiance = self.emitter.sample_direction(point, mi.Point2f(*numbers), used)
+        path = Path(sample.p, -sample.d, sample.dist, point.p)
+        used &= density > 0
+        return Sample(x, point, sample.d, path, irradiance * mi.Float(dr.select(used, 1 / density, 0)), used)
+
+    def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
+        """Return unit vectors to the light, paths, and the irradiance across them of surfaces."""
+        sample, irradiance = self.emitter.sample_direction(hit, mi.Point2f(*numbers), active)
+        return sample.d, Path(sample.p, -sample.d, sample.dist, hit.spawn_ray(sample.d).o), irradiance
+
+
+Source = PointSource | AreaSource | FarSource
+
+
+def is_sky(emitter) -> bool:
+    """Return whether an emitter of Mitsuba is a uniform sky."""
+    return bool(emitter.class_name() == "ConstantBackgroundEmitter")
+
+
+def read_source(emitter) -> Source:
+    """Read a light of a Mitsuba scene. Raises InputError for one of another kind."""
+    name = emitter.class_name()
+    if is_sky(emitter) or name == "DirectionalEmitter":
+        return FarSource(emitter)
+    if is_area(emitter):
+        return AreaSource(read_area(emitter))
+    if name not in ("PointLight", "SpotLight"):
+        raise InputError(
+            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional', "
+            "'area' or 'constant' only"
+        )
+    sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
+    position = mi.Point3d(sample.p)
+    if name == "PointLight":
+        return PointSource(emitter, position)
+    axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
+    cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])
+    return PointSource(emitter, position, axis, math.radians(cutoff))
