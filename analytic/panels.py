@@ -184,13 +184,13 @@ def _folds(integrand: _Integrand) -> float:
 
 @dataclass(frozen=True)
 class Panels:
-    """Panels and what the two rules gave for them, arrays of shape (m,)."""
+    """Panels and what the two rules gave for them, arrays of shape (m,); the last three may be (m, columns)."""
 
-    owner: Index  #: row of the segment in its chunk
-    start: Array  #: distance in w from the start of the segment
+    owner: Index  #: row of the segment, in its chunk
+    start: Array  #: in the variable of the integral; here the distance in w from the start of the segment
     width: Array
-    value: Array
-    error: Array
+    value: Array  #: the integral by Kronrod's rule
+    error: Array  #: by how much Gauss's rule differs from it
     noise: Array  #: rounding error of the value
 
 
@@ -205,7 +205,7 @@ def adapted(
 
     `first`: segment, start and width of the first panels; `evaluate`: integrates such panels; `row`: to which of
     `count` sums each segment belongs; `count`: number of sums; `rtol`: relative tolerance of each [1]. Returns `value`,
-    `error`: the sums and estimates of their errors, (count,).
+    `error`: the sums and estimates of their errors, (count,), or (count, columns): all columns share panels.
     """
     panels = evaluate(*first)
     for _ in range(_HALVINGS):
@@ -214,8 +214,9 @@ def adapted(
         missed = _summed(owner, panels.error, count) > allowed
         if not missed.any():
             break
-        share = allowed / np.maximum(np.bincount(owner, minlength=count), 1)
+        share = (allowed.T / np.maximum(np.bincount(owner, minlength=count), 1)).T
         halve = missed[owner] & (panels.error > share[owner]) & (panels.error > panels.noise)
+        halve = halve.reshape(len(halve), -1).any(axis=1)
         if not halve.any():
             break
         width = 0.5 * panels.width[halve]
@@ -227,6 +228,8 @@ def adapted(
 
 
 def _summed(owner: Index, values: Array, n: int) -> Array:
+    if values.ndim > 1:
+        return np.stack([_summed(owner, column, n) for column in values.T], axis=1)
     return np.bincount(owner, values, n).astype(np.float64, copy=False)
 
 

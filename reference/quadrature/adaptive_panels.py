@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The sum of smooth pieces of rays for any medium: panels are halved until each ray meets a tolerance.
 
-The pairs of rules are those of `analytic.panels`, and so is the variable near a place; under a direction it is the
-distance. A medium states its integrand (`Integrand`); lights, tolerances and uncertain edges are known here.
+Panels and their rules are those of `analytic.panels`, and so is the variable near a place; under a direction it is the
+distance. The integrals are albedo sigma_t J [1/m^2] of a point light, and albedo sigma_t int exp(-tau) dx [1] of a
+directional light. A medium states its integrand (`Integrand`); lights, tolerances and uncertain edges are known here.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.kronrod import Pair
-from analytic.panels import blocks_by_rule, equal_panels
+from analytic.panels import Panels, adapted, blocks_by_rule, equal_panels
 from reference.quadrature.pieces import Pieces
 from reference.quadrature.unbounded import Profile, Terms, sums_of
 from reference.visibility.planes import Rays
@@ -23,31 +23,11 @@ Index = NDArray[np.int64]
 
 RTOL = 1e-9  #: relative tolerance of the sum of a ray and a light
 AT_LIGHT = 1e-290  #: height [m] below which a ray meets the light
-_HALVINGS = 40
 _PANEL = 2.4  # width in v of the first panels, as in `analytic.panels`
 _THICK = 0.2  # optical depth over which a panel in x is as wide as one of this width in v times ten
 _NEAR_ZERO = 1e-15  # height over distance below which a light beside a piece may as well be at this height
 _PANELS = 8192  # panels at once
 _EPS = float(np.finfo(float).eps)
-
-
-@dataclass(frozen=True)
-class Panels:
-    """Panels and what the two rules gave for them.
-
-    The integrals are albedo sigma_t J [1/m^2] of a point light, in the logarithmic variable w [1], and albedo sigma_t
-    int exp(-tau) dx [1] of a directional light, in the distance x [m].
-    """
-
-    piece: Index  #: the piece that each panel is a part of, (m,)
-    start: Array  #: in the variable of the integral, (m,)
-    width: Array  #: in the same variable, (m,)
-    value: Array  #: the integral by Kronrod's rule, (m, 3)
-    error: Array  #: by how much Gauss's rule differs from it, (m, 3)
-    noise: Array  #: rounding error of the value, (m, 3)
-
-    def __getitem__(self, rows) -> "Panels":
-        return Panels(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
 class Integrand(Protocol):
@@ -91,7 +71,7 @@ def sum_pieces(
     edge = np.broadcast_to(terms.edge, len(rays.foot))
     rounding = np.zeros(len(rays.foot)) if terms.rounding is None else terms.rounding
     owner, count = pieces.ray - block.start, len(rays.foot[block])
-    value, error = _sum_panels(work.first_panels(), work.evaluate, owner, count, terms.rtol or RTOL)
+    value, error = adapted(work.first_panels(), work.evaluate, owner, count, terms.rtol or RTOL)
     error = error + sums_of(owner, work.edge_error(edge, rounding), count)
     meets = sums_of(owner, work.meets_light()[:, None] * integrand.factor, count) > 0
     return np.where(meets, np.inf, value), np.where(meets, np.inf, error)
@@ -151,8 +131,11 @@ class _Sum:
         own, begin = self.own, self.pieces.x0[rows, None]
         if self.rays.w:
             height, foot = self.height[rows, None], own.foot[rows, None]
-            cosine = 1 / np.cosh(v)
-            s, r, scatter, rate = height * np.sinh(v), height / cosine, -np.tanh(v), cosine / height
+            up = np.exp(v)
+            down = 1 / up
+            cosine = 2 / (up + down)
+            half = 0.5 * (up - down)
+            s, r, scatter, rate = height * half, height / cosine, -half * cosine, cosine / height
             x, inside = foot + s, np.maximum(s + (foot - begin), 0.0)
         else:
             x, inside, r = v, v - begin, np.full_like(v, np.inf)
@@ -174,34 +157,3 @@ class _Sum:
         same &= pieces.medium[1:] == pieces.medium[:-1]
         total[1:] += (16 * same * rounding[pieces.ray[1:]])[:, None] * np.abs(f[1:, 0] - f[:-1, 1])
         return total
-
-
-def _sum_panels(
-    first: tuple[Index, Array, Array],
-    evaluate: Callable[[Index, Array, Array], Panels],
-    owner: Index,
-    count: int,
-    rtol: float = RTOL,
-) -> tuple[Array, Array]:
-    """Halve panels until all rays meet the tolerance, or only rounding is left, and add up those of each ray.
-
-    `first`: from `first_panels`; `evaluate`: (pieces, starts, widths) -> panels; `owner`: the ray of each piece, from 0
-    on; `count`: number of rays; `rtol`: relative tolerance of the sum of each ray [1]. Returns `value`, `error`: the
-    integral of each ray and a bound of its error, (count, 3) each, in the unit of the panels' values, [1/m^2] or [1].
-    """
-    panels = evaluate(*first)
-    for _ in range(_HALVINGS):
-        ray = owner[panels.piece]
-        allowed = rtol * sums_of(ray, panels.value, count)
-        missed = sums_of(ray, panels.error, count) > allowed
-        share = allowed / np.maximum(np.bincount(ray, minlength=count), 1)[:, None]
-        halve = np.any(missed[ray] & (panels.error > share[ray]) & (panels.error > panels.noise), axis=1)
-        if not halve.any():
-            break
-        half = 0.5 * panels.width[halve]
-        start = np.concatenate([panels.start[halve], panels.start[halve] + half])
-        halves = evaluate(np.tile(panels.piece[halve], 2), start, np.tile(half, 2))
-        kept = panels[~halve]
-        panels = Panels(*(np.concatenate([getattr(p, f.name) for p in (kept, halves)]) for f in fields(Panels)))
-    ray = owner[panels.piece]
-    return sums_of(ray, panels.value, count), sums_of(ray, panels.error + panels.noise, count)

@@ -64,8 +64,8 @@ def camera_segments(truth: ReferenceScene, distance: Array) -> Segments:
     The slots of a ray hold the bodies in the order in which it passes them, and what lies before, between and behind.
     """
     spans = [crossings(medium.bounds, truth.origin, truth.direction) for medium in truth.media]
-    enter = np.maximum(np.stack([low for low, _ in spans]), 0.0)
-    leave = np.minimum(np.stack([high for _, high in spans]), distance)
+    enter, leave = np.array(spans).reshape(len(spans), 2, len(distance)).swapaxes(0, 1)
+    enter, leave = np.maximum(enter, 0.0), np.minimum(leave, distance)
     # Bodies that a ray misses come last, as nothing at the end of the ray.
     enter, leave = np.where(enter < leave, enter, distance), np.where(enter < leave, leave, distance)
     order = np.argsort(enter, axis=0, kind="stable")
