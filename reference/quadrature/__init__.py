@@ -3,12 +3,12 @@
 
 Read in this order:
 
-- `height_fog.py`: the same in height fog;
-- `unbounded.py`: sums over lit stretches in one medium without bounds;
+- `stretches.py`: lit stretches, and how lights shine on them;
+- `height_fog.py`: sums over lit stretches in height fog;
 - `segments.py`: media in convex bounds along rays and shadow segments;
-- `pieces.py`: smooth pieces of lit stretches in bounded media;
+- `pieces.py`: smooth pieces of lit stretches;
 - `adaptive_panels.py`: panels that are halved until a sum meets its tolerance;
-- `bounded.py`: sums over lit stretches in bounded media, for all lights;
+- `homogeneous.py`: sums over lit stretches in homogeneous media, bounded or not;
 - `cell_walk.py`: optical depths through a grid from cell to cell;
 - `density_grid.py`: sums over lit stretches in density grids;
 - `fields.py`: what every medium answers, the door for new ones;

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from analytic.kronrod import Pair
 from analytic.panels import Panels, adapted, blocks_by_rule, equal_panels
 from reference.quadrature.pieces import Pieces
-from reference.quadrature.unbounded import Profile, Terms, sums_of
+from reference.quadrature.stretches import Profile, Terms, sums_of
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]

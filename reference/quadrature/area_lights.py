@@ -42,8 +42,8 @@ from reference.quadrature.replicates import (
     replicate_means,
     square_points,
 )
+from reference.quadrature.stretches import Terms, cosine_profile, sums_of
 from reference.quadrature.surface import Reflection, SurfaceHits
-from reference.quadrature.unbounded import Terms, cosine_profile, sums_of
 from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.read import ReferenceScene
 from reference.visibility.before_light import IN_PLANE, before_light

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from reference.quadrature.adaptive_panels import sum_pieces
 from reference.quadrature.cell_walk import CellWalk, cell_walk
 from reference.quadrature.pieces import Kinks, Pieces, cut, whole
-from reference.quadrature.unbounded import TERMS, Stretches, Terms, strongest
+from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest
 from reference.scene.density_grid import GridMedium
 from reference.scene.device import on_device, vectors
 from reference.visibility.planes import Rays

@@ -13,13 +13,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.bounded import Bounded
 from reference.quadrature.density_grid import GridField
 from reference.quadrature.height_fog import HeightField
-from reference.quadrature.unbounded import TERMS, Stretches, Terms, Unbounded
+from reference.quadrature.homogeneous import HomogeneousField
+from reference.quadrature.stretches import TERMS, Stretches, Terms
 from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import ReferenceScene, homogeneous_around
+from reference.scene.read import ReferenceScene
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ def field_of(truth: ReferenceScene) -> Field:
         return HeightField(truth.medium)
     if isinstance(truth.medium, GridMedium):
         return GridField(truth.medium)
-    return Bounded(truth) if truth.media else Unbounded(homogeneous_around(truth))
+    return HomogeneousField(truth)
 
 
 def optical_depth(truth: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
-from reference.quadrature.unbounded import RTOL, TERMS, Stretches, Terms, strongest, sums_of, weight_of
+from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest, sums_of, weight_of
 from reference.scene.height_fog import HeightMedium
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 
+RTOL = 1e-10  #: of the integral of each stretch
 _ROUNDING = 64 * np.finfo(np.float64).eps  # of a sum of optical depths, for one of 1
 
 

@@ -25,7 +25,7 @@ from reference.quadrature.replicates import (
     square_points,
     standard_error,
 )
-from reference.quadrature.unbounded import sums_of
+from reference.quadrature.stretches import sums_of
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import ReferenceScene
 from reference.scene.shapes import read_shapes

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.fields import field_of
-from reference.quadrature.unbounded import Stretches, Terms, lit_stretches, profile_of
+from reference.quadrature.stretches import Stretches, Terms, lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import Shapes, read_shapes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.segments import AMBIENT, Segments, depth_through_media
-from reference.quadrature.unbounded import Stretches
+from reference.quadrature.stretches import Stretches
 from reference.scene.read import ReferenceMedium, ReferenceScene, homogeneous_around
 from reference.visibility.planes import Rays
 

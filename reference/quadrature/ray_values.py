@@ -7,8 +7,7 @@ For each light and each ray, in float64:
    is a polygon or a sphere its distance is computed again in float64);
 2. the ray up to there, or what is in the cone of a spot, is cut into lit intervals by exact geometry
    (`reference.visibility.shadows`), which random shadow rays then check (`reference.visibility.certificate`);
-3. the intervals are integrated and added up, with an error estimate (`reference.quadrature.unbounded`,
-   `reference.quadrature.bounded`);
+3. the intervals are integrated and added up, with an error estimate (`reference.quadrature.fields`);
 4. a light reaches the surface where its last interval does (`reference.quadrature.surface`).
 
 The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the

@@ -18,7 +18,8 @@ from reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs
 from reference.scene.read import ReferenceScene
 from tests.evidence.injected import Change, Put, Rewrite, Wrap
 
-_BOUNDED = "reference.quadrature.bounded"
+_MEDIA = "reference.quadrature.homogeneous"
+_FIELD = f"{_MEDIA}:HomogeneousField.sums"
 _SAMPLES = "reference.quadrature.light_samples"
 _WEIGHTED = "reference.quadrature.area_lights"
 _SHADOWS = "reference.visibility.shadows"
@@ -60,24 +61,37 @@ def _first_extinction(function, truth, *others, **named):
     return tuple(values * medium.sigma_t / medium.sigma_t[0] for values in function(first, *others, **named))
 
 
-def _integrals(change: Callable[..., Any]) -> Wrap:
-    """Change the arguments of the airlight integral: change(foot, height, x0, x1, sigma_t) -> named ones."""
+def _stretches(change: Callable[..., Any]) -> Wrap:
+    """Change what homogeneous media are asked: change(rays, x0, x1, sigma_t) -> other ends of the lit stretches."""
 
-    def around(function, foot, height, x0, x1, sigma_t, phase, **how):
-        columns = dict(foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, phase=phase)
-        return function(**(columns | how | change(how, foot, height, x0, x1, sigma_t)))
+    def around(function, field, rays, stretches, distance, terms):
+        ray, x0, x1 = stretches
+        x0, x1 = change(rays, x0, x1, field.truth.medium.sigma_t[0])
+        return function(field, rays, (ray, x0, np.maximum(x0, x1)), distance, terms)
 
-    return Wrap("analytic.panels:airlight_segments", around)
+    return Wrap(_FIELD, around)
+
+
+def _terms(change: Callable[..., Any]) -> Wrap:
+    """Change how lights shine: change(terms, rays, sigma_t) -> changes of the terms."""
+
+    def around(function, field, rays, stretches, distance, terms):
+        terms = replace(terms, **change(terms, rays, field.truth.medium.sigma_t[0]))
+        return function(field, rays, stretches, distance, terms)
+
+    return Wrap(_FIELD, around)
 
 
 def _times(weight: Callable[..., Any]) -> Wrap:
     """Multiply the integrand: weight(x, foot, height, sigma_t)."""
 
-    def change(how, foot, height, x0, x1, sigma_t):
-        before = how.get("weight") or (lambda x, row: 1.0)
-        return {"weight": lambda x, row: before(x, row) * weight(x, foot[row, None], height[row, None], sigma_t)}
+    def change(terms, rays, sigma_t):
+        before = terms.profile or (lambda x, ray: 1.0)
+        return {
+            "profile": lambda x, ray: before(x, ray) * weight(x, rays.foot[ray, None], rays.height[ray, None], sigma_t)
+        }
 
-    return _integrals(change)
+    return _terms(change)
 
 
 def _phase(name: str, change: Callable[..., Any]) -> Wrap:
@@ -318,16 +332,12 @@ _FOG = _all(
         "one-per-cent": _brighter(1.01),
         "three-per-mille": _brighter(1.003),
         "one-per-mille": _brighter(1.001),
-        "bright-shadow-leg": _integrals(lambda *_: {"shadow_scale": 0.0}),
+        "bright-shadow-leg": _terms(lambda *_: {"shadow_scale": 0.0}),
         "bright-camera-leg": _times(lambda x, foot, height, sigma_t: np.exp(np.minimum(sigma_t * x, 600.0))),
         "distance-not-squared": _times(lambda x, foot, height, sigma_t: np.hypot(x - foot, height)),
-        "end-at-one-optical-depth": _integrals(
-            lambda how, foot, height, x0, x1, sigma_t: {"x1": np.clip(x1, x0, np.maximum(x0, 1 / sigma_t))}
-        ),
-        "near-clip": _integrals(
-            lambda how, foot, height, x0, x1, _: {"x0": np.maximum(x0, 0.2), "x1": np.maximum(x1, 0.2)}
-        ),
-        "near-segment-skipped": _integrals(lambda how, foot, height, x0, x1, sigma_t: {"x1": np.where(x0 > 0, x1, x0)}),
+        "end-at-one-optical-depth": _stretches(lambda rays, x0, x1, sigma_t: (x0, np.minimum(x1, 1 / sigma_t))),
+        "near-clip": _stretches(lambda rays, x0, x1, sigma_t: (np.maximum(x0, 0.2), x1)),
+        "near-segment-skipped": _stretches(lambda rays, x0, x1, sigma_t: (x0, np.where(x0 > 0, x1, x0))),
         "forward-is-backward": _BACKWARD,
         "henyey-greenstein-of-two": _phase("hg", lambda value, g: 2 * value),
         "henyey-greenstein-squared": _phase("hg", lambda value, g: (1 - g * g) * (value / (1 - g * g)) ** (2 / 3)),
@@ -384,13 +394,13 @@ _SUN = _all(
     "sun",
     {
         "directional-without-four-pi": Wrap(
-            f"{_BOUNDED}:Bounded.sums",
+            _FIELD,
             lambda function, *arguments, **named: tuple(_FOUR_PI * part for part in function(*arguments, **named)),
         ),
         "directional-bright-leg": Rewrite(
-            _BOUNDED, "body_.length(rows_, x_, r_, limit_)", "0 * body_.length(rows_, x_, r_, limit_)"
+            _MEDIA, "body_.length(rows_, x_, r_, limit_)", "0 * body_.length(rows_, x_, r_, limit_)"
         ),
-        "directional-chord-both-ways": Rewrite(_BOUNDED, "np.maximum(enter, 0.0)", "enter"),
+        "directional-chord-both-ways": Rewrite(_MEDIA, "np.maximum(enter, 0.0)", "enter"),
         "directional-forward-is-backward": _BACKWARD,
         "directional-corners-behind": Rewrite(
             "reference.quadrature.segments", "(y_ > 0) & (w_ * y_ < height_)", "(y_ < 0) & (w_ * y_ < height_)"
@@ -410,7 +420,7 @@ _WIDE = _all(
     "quadrature",
     "wide-lights",
     {
-        "area-without-cosine": _integrals(lambda *_: {"weight": None}),
+        "area-without-cosine": _terms(lambda *_: {"profile": None}),
         "area-other-side": _samples(lambda samples, light: replace(samples, normal=-samples.normal)),
         "area-wrong-count": Wrap(f"{_WEIGHTED}:area_airlight", _one_too_few),
         "area-projected-sphere": _weighted(lambda light: 0.25 if light.kind == "sphere" else 1.0),

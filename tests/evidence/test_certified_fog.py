@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from analytic.phase import PhaseFunction
+from reference.quadrature.homogeneous import HomogeneousField
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.unbounded import Terms, Unbounded, lit_stretches, profile_of
-from reference.scene.read import ReferenceLight, ReferenceMedium, read_reference
+from reference.quadrature.stretches import Terms, lit_stretches, profile_of
+from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
 from reference.visibility.certificate import LitIntervals
 from reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights
@@ -187,7 +188,8 @@ def test_the_truth_of_one_point(area_rows, number):
     low, high = (rays.distance(end) for end in cone_interval(rays, light, light.cutoff))
     lit = LitIntervals(np.array([0]), np.maximum(row["x0"], low), np.minimum(row["x1"], high), edge=0.0)
     stretches, profile = lit_stretches(light, rays, lit), profile_of(light, rays)
-    value, bound = Unbounded(medium).sums(rays, stretches, np.array([np.inf]), Terms(profile))
+    alone = ReferenceScene(None, None, 1, 1, origin, along, medium, ())
+    value, bound = HomogeneousField(alone).sums(rays, stretches, np.array([np.inf]), Terms(profile))
     expected = float(row["J"]) * row["sigma_t"] / (4 * np.pi)
     assert value[0] == pytest.approx(expected, rel=1e-10)
     assert abs(value[0, 0] - expected) <= bound[0, 0]

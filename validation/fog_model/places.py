@@ -6,7 +6,7 @@ On a piece of a ray in one medium, with w = asinh((x - foot)/height),
     dx / r^2 = dw / (height cosh w),      r = height cosh w,
 
 and everything in the integrand of the airlight has its singularities at |Im w| >= pi/2, whatever the phase function
-(`reference.quadrature.bounded` says why). With half a panel of the width 1.2 the ellipse of regularity has
+(`reference.quadrature.homogeneous` says why). With half a panel of the width 1.2 the ellipse of regularity has
 rho = 1.31 + sqrt(1 + 1.31^2) = 2.96, so eight Gauss-Legendre nodes err by about rho^-16 = 3e-8, and four nodes on a
 panel of the width 0.6 (rho = 10.6) by 6e-9. The extinction adds exp(-sigma_t height e^w), entire in w; a panel over
 which it falls by many orders is the only hard one, and what is left beyond it is small.
@@ -27,12 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.panels import equal_panels
-from reference.quadrature.bounded import smooth_pieces
 from reference.quadrature.height_fog import fog_of
+from reference.quadrature.homogeneous import smooth_pieces
 from reference.quadrature.light_airlight import LitRays, sun_stretches
 from reference.quadrature.pieces import Pieces, by_medium, cut, whole
 from reference.quadrature.segments import camera_segments
-from reference.quadrature.unbounded import lit_stretches, profile_of
+from reference.quadrature.stretches import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceLight, ReferenceScene

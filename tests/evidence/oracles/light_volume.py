@@ -33,7 +33,7 @@ is one sum of cos(theta) and sin(theta). From f1 and f2 at theta1 and theta1 + d
 which changes sign once at most, where tan(e) = f1 sin(delta) / (f1 cos(delta) - f2).
 
 What is lit of a ray, faces and cones of spots taken into account, is integrated like the lit intervals of the truth
-(`reference.quadrature.unbounded`): the oracle differs from that by what the shadow map leaves out, and by nothing else.
+(`reference.quadrature.stretches`): the oracle differs from that by what the shadow map leaves out, and by nothing else.
 """
 
 from collections.abc import Sequence

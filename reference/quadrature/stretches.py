@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of lit intervals in one unbounded medium, added up for every ray, with an error bound."""
+"""Lit stretches of rays, and how lights shine on them: what every medium is asked about."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.panels import airlight_segments
 from reference.scene.read import ReferenceLight, ReferenceMedium
 from reference.scene.varying import VaryingMedium
 from reference.visibility.certificate import LitIntervals
@@ -18,9 +16,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Stretches = tuple[Index, Array, Array]  # rays, and distances of both ends [m]
 Profile = Callable[[Array, Index], Array]  # distances, (m, k) [m], and rays, (m,) -> intensity over that on the axis
-
-
-RTOL = 1e-10  #: of the integral of each stretch
 
 
 @dataclass(frozen=True)
@@ -37,46 +32,6 @@ class Terms:
 TERMS = Terms()
 
 
-@dataclass(frozen=True)
-class Unbounded:
-    """One homogeneous medium everywhere, or a vacuum; a field (`reference.quadrature.fields`)."""
-
-    medium: ReferenceMedium
-
-    @property
-    def strongest(self) -> Array:
-        """The most that a metre of a ray scatters, (3,) [1/m]."""
-        return strongest(self.medium)
-
-    def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
-        """Return the optical depth of parts of straight lines, (n, 3) [1]."""
-        return np.maximum(high - low, 0.0)[:, None] * self.medium.sigma_t
-
-    def leave(self, origin: Array, direction: Array) -> Array:
-        """Return the distance behind which rays meet nothing that scatters, (n,) [m]."""
-        return np.full(len(direction), np.inf if self.strongest.any() else 0.0)
-
-    def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
-        """Return the airlight of each ray and its bound; of a direction nothing: it reaches no fog without end."""
-        ray, x0, x1 = stretches
-        values, errors = np.zeros((len(ray), 3)), np.zeros((len(ray), 3))
-        foot, height, medium = rays.foot[ray], rays.height[ray], self.medium
-        weight = weight_of(terms.profile, ray)
-        known: dict[float, tuple[Array, Array]] = {}
-        for channel, sigma_t in enumerate(medium.sigma_t.tolist() if rays.w else []):
-            if sigma_t not in known:
-                how: dict[str, Any] = {
-                    "shadow_scale": terms.shadow_scale,
-                    "weight": weight,
-                    "rtol": terms.rtol or RTOL,
-                }
-                value, error = airlight_segments(foot, height, x0, np.maximum(x0, x1), sigma_t, medium.phase, **how)
-                known[sigma_t] = value, error + terms.edge * _edge_worth((foot, height), (x0, x1), sigma_t, medium)
-            factor = medium.albedo[channel] * sigma_t / (4 * np.pi)
-            values[:, channel], errors[:, channel] = (factor * column for column in known[sigma_t])
-        return sums_of(ray, values, len(rays.foot)), sums_of(ray, errors, len(rays.foot))
-
-
 def weight_of(profile: Profile | None, ray: Index) -> Callable[[Array, Index], Array] | None:
     """Return a profile by the numbers of the stretches of these rays."""
     return None if profile is None else lambda x, row: profile(x, ray[row])
@@ -85,21 +40,6 @@ def weight_of(profile: Profile | None, ray: Index) -> Callable[[Array, Index], A
 def strongest(medium: ReferenceMedium | VaryingMedium) -> Array:
     """Return the most that a metre of a ray scatters in a medium, albedo sigma_t p, (3,) [1/m]."""
     return medium.albedo * medium.largest * float(medium.phase(np.linspace(-1, 1, 1001)).max())
-
-
-def _edge_worth(
-    plane: tuple[Array, Array], ends: tuple[Array, Array], sigma_t: float, medium: ReferenceMedium
-) -> Array:
-    """Return what a relative uncertainty of one of the distances of the ends of each interval is worth [1/m]."""
-    foot, height = plane
-    total = np.zeros(len(foot))
-    for x in ends:
-        s = np.where(np.isfinite(x), x, 0) - foot
-        r = np.hypot(height, s)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            strip = np.exp(-sigma_t * (foot + s + r)) * medium.phase(-s / r) / r
-        total += np.where(np.isfinite(x) & (r > 0), strip, 0)
-    return total
 
 
 def sums_of(owner: Index, values: Array, count: int) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The airlight of lit stretches in scenes with bounded media, added up for every ray, with an error bound.
+r"""The airlight of lit stretches in homogeneous media, bounded or not, added up for every ray, with an error bound.
 
 The single scattering of a piece of a ray inside one medium m is, for a light at a place (w = 1) or in a direction
 (w = 0, `reference.visibility.planes`),
@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from reference.quadrature.adaptive_panels import AT_LIGHT, sum_pieces
 from reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
 from reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
-from reference.quadrature.unbounded import TERMS, Stretches, Terms, strongest
+from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest
 from reference.scene.convex_bounds import Bounds, Sphere
 from reference.scene.read import ReferenceScene, homogeneous_around
 from reference.visibility.line_crossings import crossed_facets, crossings, sphere_crossings
@@ -45,8 +45,8 @@ _RAYS = 4096  # rays at once
 
 
 @dataclass(frozen=True)
-class Bounded:
-    """Homogeneous media in disjoint convex bounds, and what surrounds them; a field (`reference.quadrature.fields`)."""
+class HomogeneousField:
+    """What surrounds the camera, and media in disjoint convex bounds; a field (`reference.quadrature.fields`)."""
 
     truth: ReferenceScene
 
@@ -64,13 +64,16 @@ class Bounded:
         if strongest(homogeneous_around(self.truth)).any():
             return np.full(len(direction), np.inf)
         spans = [crossings(medium.bounds, origin, direction) for medium in self.truth.media]
-        return np.max([np.where(enter < leave, np.maximum(leave, 0.0), 0.0) for enter, leave in spans], axis=0)
+        ends = [np.where(enter < leave, np.maximum(leave, 0.0), 0.0) for enter, leave in spans]
+        return np.max([np.zeros(len(direction)), *ends], axis=0)
 
     def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
         """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
         segments = camera_segments(replace(self.truth, direction=rays.direction), distance)
         count = len(rays.foot)
         total, bound = np.zeros((count, 3)), np.zeros((count, 3))
+        if not self.strongest.any():
+            return total, bound
         ray, x0, x1 = stretches
         for first in range(0, count, _RAYS):
             chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
@@ -91,12 +94,13 @@ def smooth_pieces(
     bounded media.
     """
     used = np.unique(stretches[0])
-    found = []
+    found: list[Kinks] = []
     for medium in truth.media:
         row, x = shadow_kinks(medium.bounds, rays[used])
         found.append((used[row], x))
     phases = _kinks_of_phases(truth, rays, used) if rays.w else []
-    ray, x = (np.concatenate(column) for column in zip(*found, *phases, strict=True))
+    none = np.empty(0, np.int64), np.empty(0)
+    ray, x = (np.concatenate(column) for column in zip(none, *found, *phases, strict=True))
     return cut_pieces(truth, rays, segments, stretches, (ray, x)), found
 
 
