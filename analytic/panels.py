@@ -215,8 +215,8 @@ def adapted(
         if not missed.any():
             break
         share = (allowed.T / np.maximum(np.bincount(owner, minlength=count), 1)).T
-        halve = missed[owner] & (panels.error > share[owner]) & (panels.error > panels.noise)
-        halve = halve.reshape(len(halve), -1).any(axis=1)
+        misses = missed[owner] & (panels.error > share[owner]) & (panels.error > panels.noise)
+        halve = np.any(misses.reshape(len(misses), -1), axis=1)
         if not halve.any():
             break
         width = 0.5 * panels.width[halve]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
-from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest, sums_of, weight_of
+from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest, sums_of
 from reference.scene.height_fog import HeightMedium
 from reference.visibility.planes import Rays
 
@@ -73,7 +73,9 @@ def _of_places(medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Te
         rays.height[ray],
         of_light,
     )
-    how: dict[str, Any] = {"weight": weight_of(terms.profile, ray), "rtol": terms.rtol or RTOL}
+    profile = terms.profile
+    weight = None if profile is None else lambda x, row: profile(x, ray[row])
+    how: dict[str, Any] = {"weight": weight, "rtol": terms.rtol or RTOL}
     ends = x0, np.maximum(x0, x1)
     value, error = height_fog_segments(fog, heights, *ends, medium.phase, shadow_scale=terms.shadow_scale, **how)
     for x in (x0, x1):  # a relative uncertainty of the distance from the light is worth r times the integrand

@@ -154,13 +154,14 @@ class _Integrand:
 
     def phase(self, rows: Index, scatter: Array) -> Array:
         """Return the phase function of each piece's medium."""
-        result = np.ones(scatter.shape)
         numbers = self.pieces.medium[rows]
-        for number in np.unique(numbers):
-            phase = medium_of(self.truth, int(number)).phase
-            if not phase.is_constant:
-                chosen = numbers == number
-                result[chosen] = phase(scatter[chosen])
+        known = np.unique(numbers)
+        if len(known) == 1:
+            return medium_of(self.truth, int(known[0])).phase(scatter)
+        result = np.empty(scatter.shape)
+        for number in known:
+            chosen = numbers == number
+            result[chosen] = medium_of(self.truth, int(number)).phase(scatter[chosen])
         return result
 
 

@@ -32,11 +32,6 @@ class Terms:
 TERMS = Terms()
 
 
-def weight_of(profile: Profile | None, ray: Index) -> Callable[[Array, Index], Array] | None:
-    """Return a profile by the numbers of the stretches of these rays."""
-    return None if profile is None else lambda x, row: profile(x, ray[row])
-
-
 def strongest(medium: ReferenceMedium | VaryingMedium) -> Array:
     """Return the most that a metre of a ray scatters in a medium, albedo sigma_t p, (3,) [1/m]."""
     return medium.albedo * medium.largest * float(medium.phase(np.linspace(-1, 1, 1001)).max())

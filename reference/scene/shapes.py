@@ -68,7 +68,7 @@ def read_shapes(scene) -> Shapes:
 
 def _read(shape) -> Array | Sphere | Disks:
     if is_polygonal(shape):
-        return _shape_triangles(shape)
+        return triangles_of(shape)
     matrix = _matrix(shape)
     length = np.linalg.norm(matrix[:3, :3], axis=0)
     if shape.class_name() == "Sphere":
@@ -94,7 +94,8 @@ def is_rectangle(shape) -> bool:
     return shape.class_name() == "Rectangle"  # has no vertices to ask for
 
 
-def _shape_triangles(shape) -> Array:
+def triangles_of(shape) -> Array:
+    """Return the triangles of a mesh or rectangle, (triangles, 3, 3) [m]."""
     if is_rectangle(shape):
         corners = np.array([[-1.0, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]])
         return (corners @ _matrix(shape).T)[:, :3][np.array([[0, 1, 2], [0, 2, 3]])]

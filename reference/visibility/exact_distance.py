@@ -43,12 +43,15 @@ def exact_distance(truth: ReferenceScene, interaction: Any, distance: Array, sha
             continue
         # A rectangle counts as one primitive; both its triangles lie in one plane.
         number_in_shape = 0 * mine if is_rectangle(shape) else primitive[mine]
-        refined[mine] = _to_plane(part[number_in_shape] - truth.origin, truth.direction[mine], distance[mine])
+        refined[mine] = to_plane(part[number_in_shape] - truth.origin, truth.direction[mine], distance[mine])
     return refined
 
 
-def _to_plane(corner: Array, direction: Array, distance: Array) -> Array:
-    """Return how far rays from the origin go to the planes of triangles."""
+def to_plane(corner: Array, direction: Array, distance: Array) -> Array:
+    """Return how far rays from the origin go to the planes of triangles, (rays, 3, 3) [m]; where they graze, as given.
+
+    `corner`: from where rays start; `direction`: unit vectors, (rays, 3); `distance`: as it was cast, (rays,) [m].
+    """
     return _along(corner[:, 0], np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), direction, distance)
 
 

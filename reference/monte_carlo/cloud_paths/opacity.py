@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.scene.clouds import CloudScene
+from reference.scene.shapes import triangles_of
+from reference.visibility.exact_distance import to_plane
 
 Array = NDArray[np.float64]
 
@@ -35,7 +37,7 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
     inside = np.full(count, clouds.camera_cloud)
     left = np.arange(count)
     extinction = np.stack([cloud.sigma_t for cloud in clouds.clouds])
-    corners = [_corners(cloud.shape) for cloud in clouds.clouds]
+    corners = [triangles_of(cloud.shape) if cloud.shape.is_mesh() else None for cloud in clouds.clouds]
     reach = float(np.abs(np.array([clouds.scene.bbox().min, clouds.scene.bbox().max])).max())
     step = 4e-7 * max(reach, float(np.abs(clouds.origin).max()))
     while left.size:
@@ -59,7 +61,7 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
             opaque &= ~on
             triangles = corners[number]
             if triangles is not None:
-                length[on] = _crossing(triangles[face[on]], clouds.origin, way[on], length[on])
+                length[on] = to_plane(triangles[face[on]] - clouds.origin, way[on], length[on])
             within = np.where(on, np.where(leaves, number, -1), within)
             inside[left[on]] = np.where(leaves[on], -1, number)
         stretch = np.maximum(length - passed[left], 0.0)
@@ -72,21 +74,3 @@ def seen_clouds(clouds: CloudScene) -> SeenClouds:
         distance[left[opaque]] = length[opaque]
         left = left[~opaque]
     return SeenClouds(np.exp(-depth), distance, meets)
-
-
-def _corners(shape) -> Array | None:
-    if not shape.is_mesh():
-        return None
-    parameters = mi.traverse(shape)
-    vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
-    return np.asarray(vertices[np.array(parameters["faces"], dtype=np.int64).reshape(-1, 3)])
-
-
-def _crossing(corners: Array, origin: Array, way: Array, near: Array) -> Array:
-    """Return where rays cross the planes of triangles, in float64; where they graze them, what the cast said."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normal = np.cross(b - a, c - a)
-    slope = (normal * way).sum(axis=1)
-    steep = np.abs(slope) > 1e-4 * np.linalg.norm(normal, axis=1)
-    exact = ((a - origin) * normal).sum(axis=1) / np.where(steep, slope, 1.0)
-    return np.where(steep, exact, near)

@@ -31,6 +31,7 @@ from reference.monte_carlo.single_scatter.boundary_walk import step_beyond
 from reference.monte_carlo.single_scatter.distance_sampling import Approach, Span, closest_approach, cone_ends
 from reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
 
+_FARTHEST = 1e15  # of places that light is scattered at [m]: squares of longer ways overflow in single precision
 _LEAST_SLOPE = 1e-12  # of a ray against the plane of a light's point
 
 
@@ -49,6 +50,7 @@ class Sample:
 class _Near:
     """Lights at places: a subclass has points, says what these send, and what part of a ray they could light."""
 
+    position: Any = None  # of all samples, where they have one
     medium: Any = None  # pointer to what every path begins in, where that is known
 
     def point(self, numbers, ray: Ray | None) -> LightPoint:
@@ -80,7 +82,7 @@ class _Near:
         way = mi.Vector3f(approach.normal * approach.height + ray.direction_double * s)
         from_light = way / mi.Float(dr.sqrt(square))
         there = point_on(ray, mi.Point3f(light.position) + way)
-        used &= density > 0
+        used &= (density > 0) & (square < _FARTHEST * _FARTHEST)
         value = self.sent(light, there, from_light) * mi.Float(dr.select(used, 1 / (square * density), 0))
         return Sample(low + y, there, -from_light, self._path(light, way), value, used)
 
@@ -137,9 +139,10 @@ class AreaSource(_Near):
 
     def point(self, numbers, ray: Ray | None) -> LightPoint:
         """Return points that are spread towards rays, or evenly over the area."""
+        u, v = numbers
         if ray is None:
-            return sample_evenly(*numbers, self.light)
-        return sample_point(*numbers, self.light, origin=ray.origin_double, direction=ray.direction_double)
+            return sample_evenly(u, v, self.light)
+        return sample_point(u, v, self.light, origin=ray.origin_double, direction=ray.direction_double)
 
     def sent(self, point: LightPoint, at, from_light) -> Any:
         """Return the intensity of points."""

@@ -74,7 +74,7 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     for pixel in lit[:: max(1, len(lit) // 4)]:
         expected = plain_airlight(truth, pixel)
         assert airlight[pixel] == pytest.approx(expected, rel=rtol), pixel
-    # 1e-9 is asked for; edges of light and shadow, of which there are none here, add 2e-6 of a strip for each end.
+    # 1e-10 is asked for; edges of light and shadow, of which there are none here, add 2e-6 of a strip for each end.
     assert np.all(bound[lit] <= 1e-4 * airlight[lit])
 
 
