@@ -125,48 +125,36 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
     )
 
 
-def sum_over_stretches(surfaces: CloudSurfaces, origin, direction, end, total, add, active=True) -> Any:
-    """Add up what the stretches of rays within clouds have, from the nearest to the farthest.
+def optical_depths(
+    surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, active=True, first: Crossing | None = None
+) -> tuple[Any, ...]:
+    """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
-    `surfaces`: the boundaries of clouds; `origin`, `direction`: rays in any precision [m] and their unit directions;
-    `end`: where they end, may be infinite [m]; `total`: the sum of no stretch, an array or a tuple of arrays of the
-    rays' width; `add`: (total, begin, end, cloud, inside) -> total, with the stretch [m] in the cloud of a number; only
-    lanes that are `inside` count; `active`: lanes to compute.
+    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`: rays in any precision [m] and
+    their unit directions; `end`: where they end, may be infinite [m]; `active`: lanes to compute; the others have a
+    depth of 0; `first`: their first crossing, if it is known.
     """
     Float = type(direction.x)
     lanes = max(dr.width(direction), dr.width(origin))
 
-    def step(x, total, going):
-        crossing = next_crossing(surfaces, origin, direction, x, going)
+    def deeper(depths, begin, crossing, going):
         inside = going & crossing.leaves
-        total = add(total, x, dr.minimum(crossing.distance, end), crossing.cloud, inside)
-        return crossing.distance, total, going & (crossing.distance < end)
-
-    zero = dr.zeros(Float, lanes)
-    _, total, _ = dr.while_loop(
-        state=(zero, total, dr.full(mi.Bool, True, lanes) & active & (zero < end)),
-        cond=lambda x, total, going: going,
-        body=step,
-        labels=("x", "total", "going"),
-    )
-    return total
-
-
-def optical_depths(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, active=True) -> tuple[Any, ...]:
-    """Return the optical depth of rays up to a distance in all clouds, by channel [1].
-
-    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`, `end`: as for
-    `sum_over_stretches`; `active`: lanes to compute; the others have a depth of 0.
-    """
-    Float = type(direction.x)
-
-    def add(depths, begin, end, cloud, inside):
-        length = dr.select(inside, end - begin, 0)
+        length = dr.select(inside, dr.minimum(crossing.distance, end) - begin, 0)
         return tuple(
-            dr.fma(dr.gather(Float, sigma_t, cloud, inside), length, depth)
+            dr.fma(dr.gather(Float, sigma_t, crossing.cloud, inside), length, depth)
             for sigma_t, depth in zip(clouds.sigma_t, depths, strict=True)
         )
 
-    lanes = max(dr.width(direction), dr.width(origin))
-    nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
-    return sum_over_stretches(surfaces, origin, direction, end, nothing, add, active)
+    def step(x, depths, going):
+        crossing = next_crossing(surfaces, origin, direction, x, going)
+        return crossing.distance, deeper(depths, x, crossing, going), going & (crossing.distance < end)
+
+    x, depths = dr.zeros(Float, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
+    going = dr.full(mi.Bool, True, lanes) & active & (x < end)
+    if first is not None:
+        depths = deeper(depths, x, first, going)
+        x, going = +first.distance, going & (first.distance < end)
+    _, depths, _ = dr.while_loop(
+        state=(x, depths, going), cond=lambda x, depths, going: going, body=step, labels=("x", "depths", "going")
+    )
+    return depths

@@ -14,7 +14,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import CloudSurfaces, next_crossing, optical_depths
+from realtime.clouds.bounds import CloudSurfaces, Crossing, next_crossing, optical_depths
 from realtime.numerics.array_types import Metres
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
@@ -26,7 +26,16 @@ _SHORTEST = 1e-6  # of a step, of the distance: rounding leaves as much
 
 
 def march(
-    surfaces: CloudSurfaces, origin, direction, end, total, *, step: Callable, add: Callable, active: Any = True
+    surfaces: CloudSurfaces,
+    origin,
+    direction,
+    end,
+    total,
+    *,
+    step: Callable,
+    add: Callable,
+    active: Any = True,
+    first: Crossing | None = None,
 ) -> Any:
     """Add up what steps of rays within clouds have, from the nearest to the farthest.
 
@@ -34,7 +43,7 @@ def march(
     end, may be infinite [m]; `total`: the sum of no step, a tuple of arrays of the rays' width; `step`: (total,
     distance [m], cloud, active) -> how long a step may be [m]; `add`: (total, begin, end, cloud, inside) -> total, and
     whether to go on, for steps [m] in the cloud of a number: the first in a stretch has no length, and says where it
-    begins; `active`: lanes to compute.
+    begins; `active`: lanes to compute; `first`: the first crossing, if it is known.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 
@@ -58,8 +67,10 @@ def march(
         return x, edge, cloud, total, going & (x < end) & (~inside | goes_on)
 
     zero = dr.zeros(Float, lanes)
-    going = dr.full(mi.Bool, True, lanes) & active & (zero < end)
-    state = (+zero, +zero, dr.zeros(mi.UInt32, lanes), total, going)
+    # Rays that start in the open go to where they first enter a cloud.
+    x = +zero if first is None else dr.select(first.leaves, zero, first.distance)
+    going = dr.full(mi.Bool, True, lanes) & active & (x < end)
+    state = (x, +zero, dr.zeros(mi.UInt32, lanes), total, going)
     *_, total, _ = dr.while_loop(state=state, cond=lambda *state: state[-1], body=body)
     return total
 
@@ -79,16 +90,25 @@ def voxel(clouds: Clouds, cloud, active) -> Metres:
 
 
 def depths_along(
-    surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any, seen: bool, active: Any = True
+    surfaces: CloudSurfaces,
+    clouds: Clouds,
+    origin,
+    direction,
+    end,
+    *,
+    stride: Any,
+    seen: bool,
+    active: Any = True,
+    first: Crossing | None = None,
 ) -> tuple[Any, ...]:
     """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
-    `surfaces`, `clouds`, `origin`, `direction`, `end`, `active`: as for
+    `surfaces`, `clouds`, `origin`, `direction`, `end`, `active`, `first`: as for
     `realtime.clouds.bounds.optical_depths`; `stride`: how long the first steps are in grids [voxels]; `seen`: whether
     the depths are those of what the eye sees: there steps grow, and end behind `OPAQUE`.
     """
     if clouds.density is None:
-        return optical_depths(surfaces, clouds, origin, direction, end, active)
+        return optical_depths(surfaces, clouds, origin, direction, end, active, first)
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 
     def step(depths, x, cloud, inside):
@@ -104,7 +124,7 @@ def depths_along(
         return depths, least(depths) < OPAQUE if seen else inside
 
     nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
-    return march(surfaces, origin, direction, end, nothing, step=step, add=add, active=active)
+    return march(surfaces, origin, direction, end, nothing, step=step, add=add, active=active, first=first)
 
 
 def leg_through(

@@ -108,7 +108,7 @@ def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, 
     may be infinite [m]; `stride` is the longest step in a grid where a ray enters [voxels].
     """
     first = next_crossing(surfaces, origin, direction, dr.zeros(type(direction.x), dr.width(direction)))
-    depths = depths_along(surfaces, clouds, origin, direction, end, stride=stride, seen=True)
+    depths = depths_along(surfaces, clouds, origin, direction, end, stride=stride, seen=True, first=first)
     return CloudRays(surfaces, clouds, origin, direction, end, depths, first)
 
 
@@ -129,7 +129,7 @@ def light_once(
     channels, lanes = len(clouds.sigma_t), dr.width(rays.direction)
     full = rays.depths
     if clouds.density is not None:
-        full = optical_depths(rays.surfaces, clouds, rays.origin, rays.direction, rays.end)
+        full = optical_depths(rays.surfaces, clouds, rays.origin, rays.direction, rays.end, first=rays.first)
     mean = sum(full) / (channels * SPREAD)
     # Of thin clouds rounding leaves nothing of 1 - exp(-T): it is never below the first two terms of its series.
     share = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) / steps
@@ -165,7 +165,8 @@ def light_once(
 
     nothing = tuple(tuple(dr.zeros(Color, lanes) for _ in beam.scales) for beam in beams)
     total = zeros(channels), tuple(zeros(channels) for _ in beams), zeros(len(beams)), nothing
-    *_, sums = march(rays.surfaces, rays.origin, rays.direction, rays.end, total, step=step, add=add)
+    way = rays.surfaces, rays.origin, rays.direction, rays.end
+    *_, sums = march(*way, total, step=step, add=add, first=rays.first)
     return finished(clouds, beams, sums)
 
 
