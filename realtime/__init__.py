@@ -43,7 +43,8 @@ this order, as `python docs/tools/frame_path.py hall shadow-planes` lists them.
 7. `methods/shadow_planes/sweep.py` walks along the planes of each ray and finds its lit intervals
    (`intervals.py`).
 8. The medium (`scene/media/medium.py`) is asked for the integral over each interval and calls the kernel,
-   `kernels/exact.py`, which asks the phase function (`scene/phase.py`).
+   `kernels/exact.py`, which asks the phase function (`scene/phase.py`), and that how far a panel may reach
+   (`scene/rule_reach.py`).
 9. Behind the stages the renderer adds up what is lit of the surfaces and the airlight and brings both to the host;
    `frame/light_on_ray.py` checks that all of it is finite.
 """
