@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight equation in float64 and in as many digits as wanted: the side of truth.
+"""The airlight equation in float64 and in as many digits as wanted: the side of the reference.
 
 Names and units are those of DESIGN section 2: lengths in metres, extinction in 1/m, J in 1/m.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one exception for what a user gave wrong, on the side of the ground truth.
+"""The one exception for what a user gave wrong, on the side of the reference.
 
 `realtime` defines its own: the two sides share no code. The command line catches both.
 """

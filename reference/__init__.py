@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ground truth: images of single scattering, each with its own error.
+"""The reference: images of single scattering, each with its own error.
 
 Three estimators lead to it. `quadrature` finds the lit intervals of every camera ray by exact geometry
 and sums airlight integrals over them in float64. `monte_carlo.single_scatter` samples the same integral as an

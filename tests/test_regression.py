@@ -62,14 +62,14 @@ LABEL = "unshadowed (uniform)"  # wrong by tens of per cent: far above the floor
         ("airlight", "p99", 1.01, 0),
         ("airlight", "max", 1.03, 0),
         ("airlight", "max", 1.05, 1),
-        ("truth", "mean", 1 + 1e-6, 0),
-        ("truth", "mean", 1 + 2e-5, 1),
+        ("reference", "mean", 1 + 1e-6, 0),
+        ("reference", "mean", 1 + 2e-5, 1),
     ],
 )
 def test_what_moves(layer, name, factor, moves):
     kept = read_baseline("open-fog")
     measured = copy.deepcopy(kept)
-    place = measured["truth"]["airlight"] if layer == "truth" else measured["configurations"][LABEL][layer]
+    place = measured["reference"]["airlight"] if layer == "reference" else measured["configurations"][LABEL][layer]
     place[name] *= factor
     assert len(compare_baseline(kept, measured)) == moves
     assert (updated(kept, measured, "why") is not None) == bool(moves)

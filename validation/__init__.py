@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes, measurements and statistics: the only package that sees both the methods and the truth.
+"""Scenes, measurements and statistics: the only package that sees both the methods and the reference.
 
 Read in this order:
 
@@ -10,7 +10,7 @@ Read in this order:
 - `columns.py`: records that know their columns: heading, unit, meaning;
 - `readers.py`: values in files of users;
 - `clock.py`: times and memory of any work;
-- `estimates/`: the truth of a scene by each estimator, budgets, and the agreement of the estimators;
+- `estimates/`: the reference of a scene by each estimator, budgets, and the agreement of the estimators;
 - `study/`: scenes x sizes x changes x configurations: what each combination costs and how wrong it is;
 - `certified/`: files of certified values: twelve scenes of fog, and airlight integrals;
 - `kernels/`: errors, cost and stability of airlight kernels;

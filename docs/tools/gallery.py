@@ -179,9 +179,9 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
     # The reference of a light with extent takes minutes: a third of the pixels along each side, drawn larger.
     coarser = COARSER if read_scene(load_scene(picture.scene, (8, 6)).scene).area_lights else 1
     loaded, frame = _frame(picture, (SMALL[0] // coarser, SMALL[1] // coarser))
-    truth = reference_image(loaded.scene).airlight
-    error = error_metrics(truth, frame.airlight).relative_rmse
-    colours = error_map(truth, np.asarray(frame.airlight, dtype=np.float64))
+    reference = reference_image(loaded.scene).airlight
+    error = error_metrics(reference, frame.airlight).relative_rmse
+    colours = error_map(reference, np.asarray(frame.airlight, dtype=np.float64))
     chosen = configuration(picture.method, None, parse_settings(picture.settings))
     whole = read_scene(load_scene(picture.scene, SMALL).scene)
     milliseconds = time_frame(prepared(whole, chosen)).frame.median_ms

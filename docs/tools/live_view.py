@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The picture of the live view in the documentation: `python -m reports.docs.live_view [FILE.png]`.
 
-It starts `airlight view`, opens its page in Chromium by Playwright (the extra `test`), and waits for the truth.
+It starts `airlight view`, opens its page in Chromium by Playwright (the extra `test`), and waits for the reference.
 """
 
 import shutil
@@ -12,7 +12,7 @@ from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[2]
 _VIEW = ["view", "colonnade", "--method", "ray-march", "--set", "steps=12"]
-_PATIENCE = 300_000  # for the truth [ms]; what is known then is shown
+_PATIENCE = 300_000  # for the reference [ms]; what is known then is shown
 
 
 def take_picture(path: Path) -> None:
@@ -35,7 +35,7 @@ def take_picture(path: Path) -> None:
                 page.wait_for_selector("html[data-reference=done]", timeout=_PATIENCE)
                 page.wait_for_selector("#other[data-known='1']")
             except TimeoutError:
-                print("the truth is not whole: the machine has other work", file=sys.stderr)
+                print("the reference is not whole: the machine has other work", file=sys.stderr)
             page.check("#run")  # to show how many frames a second has
             page.wait_for_timeout(6000)
             page.screenshot(path=path)

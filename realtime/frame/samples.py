@@ -6,7 +6,7 @@ of n mirrored at the point (Hammersley 1960), moved so that the middle of all is
 the pixel evenly, and the mean weighs it alike everywhere, a box filter. One sample is the centre itself. All pixels
 share the points, so that a frame costs what it always does.
 
-This is for pictures. The truth that methods are judged by is that of pixel centres.
+This is for pictures. The reference that methods are judged by is that of pixel centres.
 """
 
 from collections.abc import Callable, Iterator

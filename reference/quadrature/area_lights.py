@@ -82,18 +82,18 @@ class Beam:
     known: Callable[[], Obstacles]  #: looked for once, where somebody asks
 
 
-def beams_of(truth: ReferenceScene, distance: Array) -> list[Beam]:
+def beams_of(reference: ReferenceScene, distance: Array) -> list[Beam]:
     """Return the area lights of a scene, and what can stand between them and its rays up to distances [m]."""
     beams = []
-    for light in truth.area:
-        scene, shapes = before_light(truth, light)
+    for light in reference.area:
+        scene, shapes = before_light(reference, light)
         known = cache(partial(obstacles, scene, Ball(light.centre, light.radius), distance, shapes))
         beams.append(Beam(light, scene, distance, known))
     return beams
 
 
 def area_airlight(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     beams: list[Beam],
     known: Array,
     *,
@@ -104,12 +104,12 @@ def area_airlight(
 ) -> AreaAirlight:
     """Compute the airlight of all area lights along every ray.
 
-    `truth`, `beams`: the scene, and its lights from `beams_of`; `known`: the airlight of all other lights, to which
+    `reference`, `beams`: the scene, and its lights from `beams_of`; `known`: the airlight of all other lights, to which
     errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`: how many samples; `shadow_scale`: see
     `reference.quadrature.image.quadrature_image`; `tell`: called with the share of the work that is done; `keep`:
     called with the name of each part of the work and a function that does it; may return what it did before.
     """
-    count = len(truth.direction)
+    count = len(reference.direction)
     bound, checks = np.zeros((count, 3)), list[RandomChecks]()
 
     def add(active: Index, got: Kept) -> None:
@@ -165,17 +165,17 @@ def turn_of_sections(plan: PointPlan, number: int, replicate: int) -> float:
 
 def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) -> Kept:
     """Return sums over samples: radiances and bounds of their errors, (rays, 3) each, and counts of the checks."""
-    truth, light, count, each = beam.scene, beam.light, len(active), len(square)
+    reference, light, count, each = beam.scene, beam.light, len(active), len(square)
     radiance, bound, checks = np.zeros((count, 3)), np.zeros((count, 3)), [RandomChecks()]
     step = max(1, _PAIRS // each)
 
     def lit_pairs() -> Iterator[tuple[slice, Rays, Array, Array, LitIntervals]]:
         for first in range(0, count, step):
             rows = slice(first, first + step)
-            direction, distance = truth.direction[active[rows]], beam.distance[active[rows]]
-            samples = samples_for_rays(light, truth.origin, direction, distance, square)
+            direction, distance = reference.direction[active[rows]], beam.distance[active[rows]]
+            samples = samples_for_rays(light, reference.origin, direction, distance, square)
             place, normal, weight = samples.flat()
-            rays = rays_at(truth.origin, np.repeat(direction, each, axis=0), place)
+            rays = rays_at(reference.origin, np.repeat(direction, each, axis=0), place)
             low, high = before(rays, normal)
             ends = np.maximum(low, 0.0), np.minimum(high, np.repeat(distance, each))
             ends = ends[0], np.maximum(*ends)
@@ -187,8 +187,8 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
         rows, rays, normal, weight, lit = work
         terms = Terms(cosine_profile(rays, normal), shadow_scale, lit.edge, rtol=_RTOL)
         distance = np.repeat(beam.distance[active[rows]], each)
-        parts = field_of(truth).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
-        parts = parts[0], parts[1] + worth_of_doubt(truth, rays, lit)
+        parts = field_of(reference).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
+        parts = parts[0], parts[1] + worth_of_doubt(reference, rays, lit)
         value, error = ((part * weight[:, None]).reshape(-1, each, 3).sum(axis=1) * light.radiance for part in parts)
         return rows, lit.random_checks, value, error
 
@@ -201,7 +201,7 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
 
 
 def area_surface(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     hits: SurfaceHits,
     beams: list[Beam],
     known: Array,
@@ -213,16 +213,18 @@ def area_surface(
 ) -> Array:
     """Return the radiance of surfaces lit by area lights, by replicate, (rays, 3, replicates) [W/(m^2 sr)].
 
-    `truth`, `hits`, `beams`: the scene, what its rays hit, and its lights from `beams_of`; `known`: the radiance that
-    all other lights give, to which errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`, `shadow_scale`, `tell`,
-    `keep`: as in `area_airlight`.
+    `reference`, `hits`, `beams`: the scene, what its rays hit, and its lights from `beams_of`; `known`: the radiance
+    that all other lights give, to which errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`, `shadow_scale`,
+    `tell`, `keep`: as in `area_airlight`.
     """
     result = np.zeros((len(hits.distance), 3, REPLICATES))
     rows = np.flatnonzero(np.isfinite(hits.distance))
     if not len(rows):
         return result
     reflection = Reflection(hits.interaction)
-    depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), hits.distance[rows])
+    depth = optical_depth(
+        reference, reference.origin, reference.direction[rows], np.zeros(len(rows)), hits.distance[rows]
+    )
 
     def work(beam: Beam, active: Index, square: Array, turn: float) -> Kept:
         light = _reflected(beam, rows[active], square, turn, shadow_scale, reflection)
@@ -237,10 +239,10 @@ def _reflected(
     beam: Beam, active: Index, square: Array, turn: float, shadow_scale: float, reflection: Reflection
 ) -> Kept:
     """Return sums over samples of what surface points reflect, before what is between them and the camera."""
-    truth, light, each = beam.scene, beam.light, len(square)
+    reference, light, each = beam.scene, beam.light, len(square)
     total = np.zeros((len(active), 3))
     end = beam.distance[active]
-    point = truth.origin + end[:, None] * truth.direction[active]
+    point = reference.origin + end[:, None] * reference.direction[active]
     away = point - light.centre
     if light.kind == "sphere":
         sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _OUTSIDE)
@@ -257,7 +259,7 @@ def _reflected(
         rows = seeing[first : first + step]
         sections = sections_for_points(light, point[rows], square, turn)
         # Looked at from a little before the surface, where the camera sees it: what hides there is not its own.
-        eye = truth.origin + (end - _BEFORE * (1 + end))[rows, None] * truth.direction[active[rows]]
+        eye = reference.origin + (end - _BEFORE * (1 + end))[rows, None] * reference.direction[active[rows]]
         eye, uniform = np.repeat(eye, each, axis=0), np.tile(square[:, 1], len(rows))
         row, place, weight = seen_samples(sections, eye, around, np.repeat(active[rows], each), uniform)
         of = rows[row // each]
@@ -265,7 +267,7 @@ def _reflected(
         r = np.linalg.norm(way, axis=1)
         towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
         value = reflection(active[of], towards)
-        shadow = optical_depth(truth, point[of], towards, np.zeros(len(of)), shadow_scale * r)
+        shadow = optical_depth(reference, point[of], towards, np.zeros(len(of)), shadow_scale * r)
         total += sums_of(of, value * np.exp(-shadow) * weight[:, None] * light.radiance, len(total))
     return {"radiance": total}
 

@@ -21,38 +21,40 @@ _PAST = 1e-5  # of a distance, and [m]: how far beyond a crossing of a mesh the 
 _FAR = 1e30  # beyond all bounds of media [m]
 
 
-def emitted_light(truth: ReferenceScene, distance: Array) -> Array:
+def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
     """Return the radiance of lights with extent before the visible surface, and of the background where there is none.
 
     In W/(m^2 sr), (rays, 3).
 
-    `truth`: the scene; `distance`: to the visible surface, (rays,), infinite where there is none [m].
+    `reference`: the scene; `distance`: to the visible surface, (rays,), infinite where there is none [m].
 
     Valid for the side that emits; a light of material `null` is seen with what is behind it, a black one ends the ray.
     """
     total = np.zeros((len(distance), 3))
-    for light in truth.area:
-        places = _mesh_distances(light, truth) if light.kind == "mesh" else [_distance(light, truth)]
+    for light in reference.area:
+        places = _mesh_distances(light, reference) if light.kind == "mesh" else [_distance(light, reference)]
         for at in places:
             rows = np.flatnonzero(at <= distance * (1 + _OWN))
-            depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), at[rows])
+            depth = optical_depth(reference, reference.origin, reference.direction[rows], np.zeros(len(rows)), at[rows])
             total[rows] += light.radiance * np.exp(-depth)
-    if truth.background is not None:
+    if reference.background is not None:
         rows = np.flatnonzero(np.isinf(distance))
-        depth = optical_depth(truth, truth.origin, truth.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR))
+        depth = optical_depth(
+            reference, reference.origin, reference.direction[rows], np.zeros(len(rows)), np.full(len(rows), _FAR)
+        )
         interaction = dr.zeros(mi.SurfaceInteraction3f, len(rows))
-        interaction.wi = vectors(mi.Vector3f, -truth.direction[rows])
-        total[rows] += as_rows(truth.background.eval(interaction)) * np.exp(-depth)
+        interaction.wi = vectors(mi.Vector3f, -reference.direction[rows])
+        total[rows] += as_rows(reference.background.eval(interaction)) * np.exp(-depth)
     return total
 
 
-def _mesh_distances(light: ReferenceAreaLight, truth: ReferenceScene) -> Iterator[Array]:
+def _mesh_distances(light: ReferenceAreaLight, reference: ReferenceScene) -> Iterator[Array]:
     """Yield where rays meet a mesh from the side that emits, crossing after crossing, (rays,) [m]; else NaN."""
     mesh = scene_from([light.shape])
-    start, walking = np.zeros(len(truth.direction)), np.ones(len(truth.direction), bool)
+    start, walking = np.zeros(len(reference.direction)), np.ones(len(reference.direction), bool)
     while walking.any():
-        place = truth.origin + start[:, None] * truth.direction
-        hit = mesh.ray_intersect(mi.Ray3f(vectors(mi.Point3f, place), vectors(mi.Vector3f, truth.direction)))
+        place = reference.origin + start[:, None] * reference.direction
+        hit = mesh.ray_intersect(mi.Ray3f(vectors(mi.Point3f, place), vectors(mi.Vector3f, reference.direction)))
         at = start + np.array(hit.t, dtype=np.float64)
         walking &= np.isfinite(at)
         yield np.where(walking & np.array(mi.Frame3f.cos_theta(hit.wi) > 0), at, np.nan)
@@ -60,9 +62,9 @@ def _mesh_distances(light: ReferenceAreaLight, truth: ReferenceScene) -> Iterato
         start = np.where(walking, at * (1 + _PAST) + _PAST, start)
 
 
-def _distance(light: ReferenceAreaLight, truth: ReferenceScene) -> Array:
+def _distance(light: ReferenceAreaLight, reference: ReferenceScene) -> Array:
     """Return where rays meet the side of a light that emits, (rays,) [m]; NaN where they do not."""
-    origin, direction = truth.origin, truth.direction
+    origin, direction = reference.origin, reference.direction
     away = light.centre - origin
     if light.kind == "sphere":
         middle = direction @ away

@@ -51,15 +51,15 @@ class Field(Protocol):
         """
 
 
-def field_of(truth: ReferenceScene) -> Field:
+def field_of(reference: ReferenceScene) -> Field:
     """Return what fills a scene."""
-    if isinstance(truth.medium, HeightMedium):
-        return HeightField(truth.medium)
-    if isinstance(truth.medium, GridMedium):
-        return GridField(truth.medium)
-    return HomogeneousField(truth)
+    if isinstance(reference.medium, HeightMedium):
+        return HeightField(reference.medium)
+    if isinstance(reference.medium, GridMedium):
+        return GridField(reference.medium)
+    return HomogeneousField(reference)
 
 
-def optical_depth(truth: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+def optical_depth(reference: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
     """Return the optical depth of parts of straight lines in a scene; see `Field.optical_depth`."""
-    return field_of(truth).optical_depth(origin, direction, low, high)
+    return field_of(reference).optical_depth(origin, direction, low, high)

@@ -48,28 +48,30 @@ _RAYS = 4096  # rays at once
 class HomogeneousField:
     """What surrounds the camera, and media in disjoint convex bounds; a field (`reference.quadrature.fields`)."""
 
-    truth: ReferenceScene
+    reference: ReferenceScene
 
     @property
     def strongest(self) -> Array:
         """The most that a metre of a ray scatters, (3,) [1/m]."""
-        return np.max([strongest(medium) for medium in (homogeneous_around(self.truth), *self.truth.media)], axis=0)
+        return np.max(
+            [strongest(medium) for medium in (homogeneous_around(self.reference), *self.reference.media)], axis=0
+        )
 
     def optical_depth(self, origin: Array, direction: Array, low: Array, high: Array) -> Array:
         """Return the optical depth of parts of straight lines, (n, 3) [1]."""
-        return depth_through_media(self.truth, origin, direction, low, high)
+        return depth_through_media(self.reference, origin, direction, low, high)
 
     def leave(self, origin: Array, direction: Array) -> Array:
         """Return the distance behind which rays meet nothing that scatters, (n,) [m]."""
-        if strongest(homogeneous_around(self.truth)).any():
+        if strongest(homogeneous_around(self.reference)).any():
             return np.full(len(direction), np.inf)
-        spans = [crossings(medium.bounds, origin, direction) for medium in self.truth.media]
+        spans = [crossings(medium.bounds, origin, direction) for medium in self.reference.media]
         ends = [np.where(enter < leave, np.maximum(leave, 0.0), 0.0) for enter, leave in spans]
         return np.max([np.zeros(len(direction)), *ends], axis=0)
 
     def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
         """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each."""
-        segments = camera_segments(replace(self.truth, direction=rays.direction), distance)
+        segments = camera_segments(replace(self.reference, direction=rays.direction), distance)
         count = len(rays.foot)
         total, bound = np.zeros((count, 3)), np.zeros((count, 3))
         if not self.strongest.any():
@@ -77,16 +79,16 @@ class HomogeneousField:
         ray, x0, x1 = stretches
         for first in range(0, count, _RAYS):
             chosen = (ray >= first) & (ray < first + _RAYS) & (x1 > x0)
-            pieces, kinks = smooth_pieces(self.truth, rays, segments, (ray[chosen], x0[chosen], x1[chosen]))
+            pieces, kinks = smooth_pieces(self.reference, rays, segments, (ray[chosen], x0[chosen], x1[chosen]))
             if len(pieces.ray):
                 block = slice(first, first + _RAYS)
-                integrand = _Integrand(self.truth, pieces, rays[pieces.ray], kinks, terms.shadow_scale)
+                integrand = _Integrand(self.reference, pieces, rays[pieces.ray], kinks, terms.shadow_scale)
                 total[block], bound[block] = sum_pieces(rays, pieces, integrand, block, terms)
         return total / (4 * np.pi), bound / (4 * np.pi)
 
 
 def smooth_pieces(
-    truth: ReferenceScene, rays: Rays, segments: Segments, stretches: Stretches
+    reference: ReferenceScene, rays: Rays, segments: Segments, stretches: Stretches
 ) -> tuple[Pieces, list[Kinks]]:
     """Cut lit stretches at the bounds of media and at the kinks of shadow segments and of phase functions.
 
@@ -95,19 +97,19 @@ def smooth_pieces(
     """
     used = np.unique(stretches[0])
     found: list[Kinks] = []
-    for medium in truth.media:
+    for medium in reference.media:
         row, x = shadow_kinks(medium.bounds, rays[used])
         found.append((used[row], x))
-    phases = _kinks_of_phases(truth, rays, used) if rays.w else []
+    phases = _kinks_of_phases(reference, rays, used) if rays.w else []
     none = np.empty(0, np.int64), np.empty(0)
     ray, x = (np.concatenate(column) for column in zip(none, *found, *phases, strict=True))
-    return cut_pieces(truth, rays, segments, stretches, (ray, x)), found
+    return cut_pieces(reference, rays, segments, stretches, (ray, x)), found
 
 
-def _kinks_of_phases(truth: ReferenceScene, rays: Rays, used: Index) -> list[Kinks]:
+def _kinks_of_phases(reference: ReferenceScene, rays: Rays, used: Index) -> list[Kinks]:
     """Return rays, among those used, and distances of the kinks of phase functions."""
     every = []
-    for phase in {id(medium.phase): medium.phase for medium in (truth.medium, *truth.media)}.values():
+    for phase in {id(medium.phase): medium.phase for medium in (reference.medium, *reference.media)}.values():
         offset = np.outer(rays.height[used], -phase.kinks / np.sqrt(1 - phase.kinks**2))
         every.append((np.repeat(used, len(phase.kinks)), (rays.foot[used, None] + offset).ravel()))
     return every
@@ -117,7 +119,7 @@ def _kinks_of_phases(truth: ReferenceScene, rays: Rays, used: Index) -> list[Kin
 class _Integrand:
     """exp(-tau) p on the pieces of one block of rays (`reference.quadrature.adaptive_panels.Integrand`)."""
 
-    truth: ReferenceScene
+    reference: ReferenceScene
     pieces: Pieces
     own: Rays  # the ray of each piece
     kinks: list[Kinks]  # of each bounded medium, see `smooth_pieces`
@@ -130,25 +132,25 @@ class _Integrand:
     bodies: list["_Body"] = field(init=False)
 
     def __post_init__(self):
-        truth, pieces = self.truth, self.pieces
-        sigma_t = by_medium(truth, "sigma_t", pieces.medium)
-        self.factor, self.extinction = sigma_t * by_medium(truth, "albedo", pieces.medium), sigma_t.max(axis=1)
-        every = np.stack([medium.sigma_t for medium in (truth.medium, *truth.media)])
+        reference, pieces = self.reference, self.pieces
+        sigma_t = by_medium(reference, "sigma_t", pieces.medium)
+        self.factor, self.extinction = sigma_t * by_medium(reference, "albedo", pieces.medium), sigma_t.max(axis=1)
+        every = np.stack([medium.sigma_t for medium in (reference.medium, *reference.media)])
         _, self.different, self.same = np.unique(every, axis=1, return_index=True, return_inverse=True)
         self.sigma_t = sigma_t[:, self.different]
         self.bodies = [
             _Body.of(self.own, pieces, medium.bounds, kinks)
-            for medium, kinks in zip(truth.media, self.kinks, strict=True)
+            for medium, kinks in zip(reference.media, self.kinks, strict=True)
         ]
 
     def __call__(self, rows: Index, x: Array, inside: Array, r: Array, scatter: Array) -> tuple[Array, Array]:
-        truth = self.truth
+        reference = self.reference
         depth = self.pieces.depth[rows][:, None, self.different] + inside[:, :, None] * self.sigma_t[rows, None]
-        around = truth.medium.sigma_t[self.different]
+        around = reference.medium.sigma_t[self.different]
         limit = self.scale * r if self.own.w else r
         if np.any(around > 0):
             depth += limit[:, :, None] * around
-        for medium, body in zip(truth.media, self.bodies, strict=True):
+        for medium, body in zip(reference.media, self.bodies, strict=True):
             depth += body.length(rows, x, r, limit)[:, :, None] * (medium.sigma_t[self.different] - around)
         return np.exp(-depth) * self.phase(rows, scatter)[:, :, None], depth
 
@@ -157,11 +159,11 @@ class _Integrand:
         numbers = self.pieces.medium[rows]
         known = np.unique(numbers)
         if len(known) == 1:
-            return medium_of(self.truth, int(known[0])).phase(scatter)
+            return medium_of(self.reference, int(known[0])).phase(scatter)
         result = np.empty(scatter.shape)
         for number in known:
             chosen = numbers == number
-            result[chosen] = medium_of(self.truth, int(number)).phase(scatter[chosen])
+            result[chosen] = medium_of(self.reference, int(number)).phase(scatter[chosen])
         return result
 
 

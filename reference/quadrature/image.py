@@ -40,7 +40,7 @@ _CHUNK = 1 << 17  # rays at once
 
 
 def quadrature_image(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     *,
     checks: int = 32,
     shadow_scale: float = 1.0,
@@ -52,12 +52,12 @@ def quadrature_image(
 ) -> ReferenceImage:
     """Compute the reference of an image.
 
-    `truth`: the scene; `checks`: random shadow rays to each ray and light, which check the lit intervals;
-    `shadow_scale`: attenuate over this share [1] of each shadow segment: 1 is the truth, 1 - epsilon what a renderer
-    with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays off the
-    surface, and so do those for `surface` then (`reference.visibility.certificate.reached_by_shadow_rays`). `pixel`:
-    "centre": the radiance along the ray through the centre. "area": the mean over the pixel. `tolerance`: of a mean
-    over a pixel: the standard error over value [1] for which positions are chosen, up to 128 in each replicate.
+    `reference`: the scene; `checks`: random shadow rays to each ray and light, which check the lit intervals;
+    `shadow_scale`: attenuate over this share [1] of each shadow segment: 1 is the reference, 1 - epsilon what a
+    renderer with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays
+    off the surface, and so do those for `surface` then (`reference.visibility.certificate.reached_by_shadow_rays`).
+    `pixel`: "centre": the radiance along the ray through the centre. "area": the mean over the pixel. `tolerance`: of a
+    mean over a pixel: the standard error over value [1] for which positions are chosen, up to 128 in each replicate.
     `airlight_se` and `surface_se` say what was reached. `progress`: called with (done, total, what) as the work goes
     on; `plan`: how many samples stand for area lights, along rays through pixel centres; `keep`: called with the name
     of each part of that work and a function that does it: it may keep what it returns, and give it back when the same
@@ -70,19 +70,19 @@ def quadrature_image(
     """
     how: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale}
     if pixel == "area":
-        return _means(truth, tolerance, plan, progress, how)
+        return _means(reference, tolerance, plan, progress, how)
     if pixel != "centre":
         raise InputError(f"pixel is '{pixel}'; wanted 'centre' or 'area'")
-    values = ray_values(truth, progress=progress, plan=plan, keep=keep, **how)
+    values = ray_values(reference, progress=progress, plan=plan, keep=keep, **how)
     layers = np.concatenate([values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1)
-    return _image(truth, values, layers, values.bound, values.replicates if truth.is_sampled else None)
+    return _image(reference, values, layers, values.bound, values.replicates if reference.is_sampled else None)
 
 
 def _image(
-    truth: ReferenceScene, centre: RayValues, layers: Array, bound: Array, replicates: Array | None
+    reference: ReferenceScene, centre: RayValues, layers: Array, bound: Array, replicates: Array | None
 ) -> ReferenceImage:
     """Return the image of layers, (pixels, 6 or 9); distances, angles and checks are those of the centres."""
-    shape, checked = (truth.height, truth.width), centre.random_checks
+    shape, checked = (reference.height, reference.width), centre.random_checks
     extra: dict[str, Any] = {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
     if replicates is not None:
         errors = standard_error(replicates[:, :6]).reshape(*shape, 6)
@@ -105,17 +105,17 @@ def _image(
 
 
 def _means(
-    truth: ReferenceScene, tolerance: float, plan: PointPlan | None, progress: Progress | None, how: dict[str, Any]
+    reference: ReferenceScene, tolerance: float, plan: PointPlan | None, progress: Progress | None, how: dict[str, Any]
 ) -> ReferenceImage:
     """Return the means over the areas of all pixels."""
-    size, shapes = (truth.width, truth.height), read_shapes(truth.occluders)
+    size, shapes = (reference.width, reference.height), read_shapes(reference.occluders)
     corner = pixel_centres(size) - 0.5
-    sensor = truth.scene.sensors()[0]
+    sensor = reference.scene.sensors()[0]
     seed = plan.seed if plan is not None else 0
     lights = PointPlan(error=0.0, first=_OF_LIGHTS, most=_OF_LIGHTS)
     bounds, checks = np.zeros((len(corner), 3)), list[RandomChecks]()
     # Replicates are looked at together, but under area lights each has samples of them of its own.
-    groups = [[replicate] for replicate in range(REPLICATES)] if truth.is_sampled else [list(range(REPLICATES))]
+    groups = [[replicate] for replicate in range(REPLICATES)] if reference.is_sampled else [list(range(REPLICATES))]
     rounds, done = 2 * _POSITIONS.rounds * len(groups), 0
 
     def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
@@ -129,7 +129,7 @@ def _means(
             parts = []
             for first in range(0, len(positions), _CHUNK):
                 direction = film_directions(sensor, positions[first : first + _CHUNK], size)
-                ray = ray_values(replace(truth, direction=direction), plan=of_lights, shapes=shapes, **how)
+                ray = ray_values(replace(reference, direction=direction), plan=of_lights, shapes=shapes, **how)
                 emitted = ray.emitted.reshape(len(direction), -1)
                 parts.append(np.concatenate([ray.airlight, ray.surface, emitted], axis=1))
                 if part != PILOT:
@@ -142,11 +142,11 @@ def _means(
                 progress(done, rounds, "positions in pixels")
         return np.moveaxis(np.concatenate(total), 0, -1)
 
-    centre = ray_values(truth, plan=lights, shapes=shapes, **how)
+    centre = ray_values(reference, plan=lights, shapes=shapes, **how)
     chosen = replace(_POSITIONS, error=tolerance, seed=seed)
     known = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
     means, counts = replicate_means(len(corner), known, chosen, sums)
     if progress is not None:
         progress(rounds, rounds, "positions in pixels")
     checked = replace(centre, random_checks=RandomChecks.of_all([centre.random_checks, *checks]))
-    return _image(truth, checked, means.mean(axis=2), bounds / (REPLICATES * counts[:, None]), means)
+    return _image(reference, checked, means.mean(axis=2), bounds / (REPLICATES * counts[:, None]), means)

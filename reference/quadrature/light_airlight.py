@@ -46,24 +46,24 @@ class LitRays:
 
 
 def light_airlight(
-    truth: ReferenceScene, light: ReferenceLight, distance: Array, *, shadow_scale: float = 1.0, **how: Any
+    reference: ReferenceScene, light: ReferenceLight, distance: Array, *, shadow_scale: float = 1.0, **how: Any
 ) -> LightAirlight:
     """Compute the airlight of one point or spot light along every ray.
 
-    `truth`, `light`: the scene and one of its lights; `distance`: to the visible surface, (rays,), infinite where there
-    is none [m]; `shadow_scale`: see `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
+    `reference`, `light`: the scene and one of its lights; `distance`: to the visible surface, (rays,), infinite where
+    there is none [m]; `shadow_scale`: see `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
     """
-    found = lit_rays(truth, light, distance, **how)
+    found = lit_rays(reference, light, distance, **how)
     rays, lit = found.rays, found.lit
-    radiance, bound = lit_sums(truth, light, rays, lit, distance, shadow_scale)
+    radiance, bound = lit_sums(reference, light, rays, lit, distance, shadow_scale)
     in_front = (rays.foot > 0) & (rays.foot < distance)
     angle = np.where(in_front, np.arctan2(rays.height, rays.foot), np.pi)
-    bound = bound + worth_of_doubt(truth, rays, lit) * light.intensity
+    bound = bound + worth_of_doubt(reference, rays, lit) * light.intensity
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
 
 
 def lit_sums(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     light: ReferenceLight,
     rays: Rays,
     lit: LitIntervals,
@@ -73,12 +73,12 @@ def lit_sums(
     """Return the airlight of a point or spot light from the lit intervals of rays, and its bound, (rays, 3) each."""
     stretches = lit_stretches(light, rays, lit)
     terms = Terms(profile_of(light, rays), shadow_scale, lit.edge)
-    value, bound = field_of(truth).sums(rays, stretches, distance, terms)
+    value, bound = field_of(reference).sums(rays, stretches, distance, terms)
     return value * light.intensity, bound * light.intensity
 
 
 def lit_rays(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     light: ReferenceLight,
     distance: Array,
     *,
@@ -88,65 +88,74 @@ def lit_rays(
 ) -> LitRays:
     """Return which parts of the rays a point or spot light reaches.
 
-    `truth`, `light`, `distance`: see `light_airlight`; `shapes`: what `reference.scene.shapes.read_shapes` returned, if
-    known; `known`: what can stand in the light, if that was found for a ball that holds it; `checks`: random shadow
-    rays to each ray.
+    `reference`, `light`, `distance`: see `light_airlight`; `shapes`: what `reference.scene.shapes.read_shapes`
+    returned, if known; `known`: what can stand in the light, if that was found for a ball that holds it; `checks`:
+    random shadow rays to each ray.
     """
-    rays = rays_at(truth.origin, truth.direction, light.position)
+    rays = rays_at(reference.origin, reference.direction, light.position)
     cone = cone_interval(rays, light, light.cutoff)
     none = cone[0] > cone[1]
     ends = np.maximum(rays.distance(cone[0]), 0.0), np.minimum(rays.distance(cone[1]), distance)
     ends = np.where(none, 0.0, ends[0]), np.where(none, 0.0, ends[1])
     normal = None
     if light.cosine and light.axis is not None:
-        normal = np.broadcast_to(light.axis, truth.direction.shape)
-    known = obstacles(truth, Ball(light.position), distance, shapes) if known is None else known
+        normal = np.broadcast_to(light.axis, reference.direction.shape)
+    known = obstacles(reference, Ball(light.position), distance, shapes) if known is None else known
     lit = lit_intervals(rays, ends, known, checks=checks, normal=normal)
     return LitRays(rays, lit, distance, known.shapes, ends[1])
 
 
-def directional_airlight(truth: ReferenceScene, light: DirectionalLight, distance: Array, **how: Any) -> LightAirlight:
+def directional_airlight(
+    reference: ReferenceScene, light: DirectionalLight, distance: Array, **how: Any
+) -> LightAirlight:
     """Compute the airlight of one directional light along every ray; see `light_airlight`."""
-    found = lit_parallel_rays(truth, light, distance, **how)
+    found = lit_parallel_rays(reference, light, distance, **how)
     rays, lit = found.rays, found.lit
-    field, angle = field_of(truth), np.full(len(distance), np.pi)
-    _, _, high = stretches = sun_stretches(truth, found)
+    field, angle = field_of(reference), np.full(len(distance), np.pi)
+    _, _, high = stretches = sun_stretches(reference, found)
     # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(distance)))
     terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
     sums = field.sums(rays, stretches, distance, terms)
     radiance, bound = (part * light.irradiance for part in sums)
-    bound = bound + worth_of_doubt(truth, rays, lit) * light.irradiance
+    bound = bound + worth_of_doubt(reference, rays, lit) * light.irradiance
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
 
 
-def sun_stretches(truth: ReferenceScene, found: LitRays) -> Stretches:
+def sun_stretches(reference: ReferenceScene, found: LitRays) -> Stretches:
     """Return which parts of rays a directional light reaches; the last may end where its ray leaves the media."""
     lit = found.lit
     # Behind all that could stand in the light, a ray is lit or not as at the end of what was looked at.
     goes_on = (reaches(lit, found.end) & np.isinf(found.distance))[lit.ray]
     last = lit.high * (1 + _END) >= found.end[lit.ray]
-    leaves = np.where(goes_on & last, field_of(truth).leave(truth.origin, truth.direction)[lit.ray], lit.high)
+    leaves = np.where(
+        goes_on & last, field_of(reference).leave(reference.origin, reference.direction)[lit.ray], lit.high
+    )
     return lit.ray, lit.low, np.maximum(lit.high, leaves)
 
 
 def lit_parallel_rays(
-    truth: ReferenceScene, light: DirectionalLight, distance: Array, *, shapes: Shapes | None = None, checks: int = 32
+    reference: ReferenceScene,
+    light: DirectionalLight,
+    distance: Array,
+    *,
+    shapes: Shapes | None = None,
+    checks: int = 32,
 ) -> LitRays:
     """Return which parts of the rays a directional light reaches; see `lit_rays`."""
-    rays = rays_at(truth.origin, truth.direction, -light.direction, w=0)
-    shapes = read_shapes(truth.occluders) if shapes is None else shapes
+    rays = rays_at(reference.origin, reference.direction, -light.direction, w=0)
+    shapes = read_shapes(reference.occluders) if shapes is None else shapes
     # No shadow falls on a ray where it has left the light's cylinder about all shapes.
     clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
-    last = np.minimum(field_of(truth).leave(truth.origin, truth.direction), clear)
+    last = np.minimum(field_of(reference).leave(reference.origin, reference.direction), clear)
     end = np.where(np.isfinite(distance), distance, last)
-    known = obstacles(truth, Ball(-light.direction, w=0), end, shapes)
+    known = obstacles(reference, Ball(-light.direction, w=0), end, shapes)
     lit = lit_intervals(rays, (np.zeros_like(end), end), known, checks=checks)
     return LitRays(rays, lit, distance, known.shapes, end)
 
 
-def worth_of_doubt(truth: ReferenceScene, rays: Rays, lit: LitIntervals) -> Array:
+def worth_of_doubt(reference: ReferenceScene, rays: Rays, lit: LitIntervals) -> Array:
     """Return the most that what shadow rays left in doubt can be worth for a light of strength 1, (rays, 3).
 
     In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one, and the phase
@@ -155,5 +164,5 @@ def worth_of_doubt(truth: ReferenceScene, rays: Rays, lit: LitIntervals) -> Arra
     worth = np.zeros((len(rays.foot), 3))
     ray, part = lit.doubt
     part = part / rays.height[ray] if rays.w else part
-    np.add.at(worth, ray, part[:, None] * field_of(truth).strongest / (4 * np.pi))
+    np.add.at(worth, ray, part[:, None] * field_of(reference).strongest / (4 * np.pi))
     return worth

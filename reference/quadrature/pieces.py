@@ -22,14 +22,14 @@ Kinks = tuple[Index, Array]  # rays, and distances along them [m]
 _UNDERFLOW = 745.0  # optical depth after which nothing is left
 
 
-def medium_of(truth: ReferenceScene, number: int) -> ReferenceMedium:
+def medium_of(reference: ReferenceScene, number: int) -> ReferenceMedium:
     """Return the medium of this number."""
-    return homogeneous_around(truth) if number == AMBIENT else truth.media[number]
+    return homogeneous_around(reference) if number == AMBIENT else reference.media[number]
 
 
-def by_medium(truth: ReferenceScene, name: str, numbers: Index) -> Array:
+def by_medium(reference: ReferenceScene, name: str, numbers: Index) -> Array:
     """Return a property of the media of these numbers, (n, 3)."""
-    media = (*truth.media, truth.medium)  # AMBIENT is the last
+    media = (*reference.media, reference.medium)  # AMBIENT is the last
     return np.stack([getattr(medium, name) for medium in media])[numbers]
 
 
@@ -50,19 +50,20 @@ class Pieces:
         return Pieces(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
-def cut_pieces(truth: ReferenceScene, rays: Rays, segments: Segments, lit: Stretches, kinks: Kinks) -> Pieces:
+def cut_pieces(reference: ReferenceScene, rays: Rays, segments: Segments, lit: Stretches, kinks: Kinks) -> Pieces:
     """Cut lit stretches at the bounds of media and at every kink of the integrand.
 
-    `truth`, `rays`, `segments`: the scene, the rays, and the media along them; `lit`: rays, (stretches,), and distances
-    of both ends, (stretches,) each [m]; `kinks`: rays and distances of the kinks, (kinks,) each [m], in any order.
+    `reference`, `rays`, `segments`: the scene, the rays, and the media along them; `lit`: rays, (stretches,), and
+    distances of both ends, (stretches,) each [m]; `kinks`: rays and distances of the kinks, (kinks,) each [m], in any
+    order.
     """
-    parts = _parts(truth, rays, segments, *lit)
+    parts = _parts(reference, rays, segments, *lit)
     if not len(parts.ray):  # of a batch of rays none is lit within the media
         return parts
-    before = depth_through_media(truth, rays.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0)
+    before = depth_through_media(reference, rays.origin, rays.direction[parts.ray], np.zeros(len(parts.ray)), parts.x0)
     pieces = cut(parts, kinks)
     into = (pieces.x0 - parts.x0[pieces.part])[:, None]
-    return replace(pieces, depth=before[pieces.part] + into * by_medium(truth, "sigma_t", pieces.medium))
+    return replace(pieces, depth=before[pieces.part] + into * by_medium(reference, "sigma_t", pieces.medium))
 
 
 def whole(lit: Stretches) -> Pieces:
@@ -73,7 +74,7 @@ def whole(lit: Stretches) -> Pieces:
     return Pieces(ray, medium, x0, x1, every, np.isfinite(x1), np.zeros((len(ray), 3)), np.arange(len(ray)))
 
 
-def _parts(truth: ReferenceScene, rays: Rays, segments: Segments, ray: Index, x0: Array, x1: Array) -> Pieces:
+def _parts(reference: ReferenceScene, rays: Rays, segments: Segments, ray: Index, x0: Array, x1: Array) -> Pieces:
     """Return what parts of lit intervals lie in each medium, by ray and distance."""
     parts = []
     for start, end, medium in zip(segments.start, segments.end, segments.medium):
@@ -84,7 +85,7 @@ def _parts(truth: ReferenceScene, rays: Rays, segments: Segments, ray: Index, x0
     ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
     if np.any(np.isinf(high)):
         # Only what surrounds the bodies is endless, and only if its extinction is not zero does it scatter.
-        sigma_t = truth.medium.sigma_t
+        sigma_t = reference.medium.sigma_t
         reach = np.maximum(low, rays.foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
         high = np.where(np.isinf(high), reach, high)
     order = np.lexsort((low, ray))

@@ -83,7 +83,7 @@ class RayValues:
 
 
 def ray_values(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     *,
     checks: int = 32,
     shadow_scale: float = 1.0,
@@ -92,30 +92,30 @@ def ray_values(
     plan: PointPlan | None = None,
     keep: Keep | None = None,
 ) -> RayValues:
-    """Compute airlight, lit surface, distances and lit intervals of every ray of `truth.direction`.
+    """Compute airlight, lit surface, distances and lit intervals of every ray of `reference.direction`.
 
-    `truth`: the scene, with any rays; `checks`, `shadow_scale`, `progress`, `plan`, `keep`: see
+    `reference`: the scene, with any rays; `checks`, `shadow_scale`, `progress`, `plan`, `keep`: see
     `reference.quadrature.image.quadrature_image`; `shapes`: what `reference.scene.shapes.read_shapes` returned for the
     occluders, if that is known. Returns RayValues: radiances, (rays, 3) [W/(m^2 sr)], distances, (rays,) [m], and how
     the lit intervals were checked.
     """
-    shapes = read_shapes(truth.occluders) if shapes is None else shapes
-    hits = surface_hits(truth)
+    shapes = read_shapes(reference.occluders) if shapes is None else shapes
+    hits = surface_hits(reference)
     cast = hits.distance
-    hits = replace(hits, distance=exact_distance(truth, hits.interaction, cast, shapes))
-    count = len(truth.direction)
+    hits = replace(hits, distance=exact_distance(reference, hits.interaction, cast, shapes))
+    count = len(reference.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
     intervals, transitions, found = np.zeros(count, np.int64), 0, list[RandomChecks]()
     reached: list[NDArray[np.bool_]] = []
     how = {"checks": checks, "shapes": shapes}
-    wide_parts = 2 * bool(truth.area) + (truth.sky is not None)
-    total = len(truth.lights) + len(truth.directional) + _STEPS * wide_parts
-    lights: list[ReferenceLight | DirectionalLight] = [*truth.lights, *truth.directional]
+    wide_parts = 2 * bool(reference.area) + (reference.sky is not None)
+    total = len(reference.lights) + len(reference.directional) + _STEPS * wide_parts
+    lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for number, light in enumerate(lights):
         if isinstance(light, DirectionalLight):
-            received = directional_airlight(truth, light, hits.distance, **how)
+            received = directional_airlight(reference, light, hits.distance, **how)
         else:
-            received = light_airlight(truth, light, hits.distance, shadow_scale=shadow_scale, **how)
+            received = light_airlight(reference, light, hits.distance, shadow_scale=shadow_scale, **how)
         airlight += received.radiance
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)
@@ -124,33 +124,33 @@ def ray_values(
         found.append(received.lit.random_checks)
         seen = received.reached
         if shadow_scale != 1 and not isinstance(light, DirectionalLight):
-            what = {"scene": truth.occluders, "shapes": shapes}
+            what = {"scene": reference.occluders, "shapes": shapes}
             seen = reached_by_shadow_rays(hits.interaction, light.position, seen, **what)
         reached.append(seen)
         if progress is not None:
             progress(number + 1, total, "quadrature")
-    surface = lit_surface(truth, hits, reached=reached, shadow_scale=shadow_scale)
+    surface = lit_surface(reference, hits, reached=reached, shadow_scale=shadow_scale)
     wide: dict[str, Any] = {}
-    if truth.area or truth.background is not None:
-        wide = {"emitted": emitted_light(truth, hits.distance)}
+    if reference.area or reference.background is not None:
+        wide = {"emitted": emitted_light(reference, hits.distance)}
     plan = plan or PointPlan()
-    if truth.area:
+    if reference.area:
         done = total - _STEPS * wide_parts
         tell = partial(_tell, progress, total)
         how_kept: dict[str, Any] = {"plan": plan, "shadow_scale": shadow_scale} | ({"keep": keep} if keep else {})
-        beams = beams_of(truth, hits.distance)
-        scattered = area_airlight(truth, beams, airlight, tell=partial(tell, done), **how_kept)
+        beams = beams_of(reference, hits.distance)
+        scattered = area_airlight(reference, beams, airlight, tell=partial(tell, done), **how_kept)
         lit = np.zeros_like(scattered.replicates)
         if plan.surfaces:
-            lit = area_surface(truth, hits, beams, surface, tell=partial(tell, done + _STEPS), **how_kept)
+            lit = area_surface(reference, hits, beams, surface, tell=partial(tell, done + _STEPS), **how_kept)
         tell(done + 2 * _STEPS, 0.0)
         replicates = np.concatenate([scattered.replicates, lit], axis=1)
         mean = replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + scattered.bound
         found.append(scattered.random_checks)
         wide["replicates"] = replicates
-    if truth.sky is not None:
-        sky = sky_light(truth, hits, shapes=shapes, plan=plan, tell=partial(_tell, progress, total, total - _STEPS))
+    if reference.sky is not None:
+        sky = sky_light(reference, hits, shapes=shapes, plan=plan, tell=partial(_tell, progress, total, total - _STEPS))
         mean = sky.replicates.mean(axis=2)
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + sky.bound
         wide["replicates"] = wide.get("replicates", 0.0) + sky.replicates

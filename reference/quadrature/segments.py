@@ -41,36 +41,36 @@ class Segments:
     medium: Index  #: number in `ReferenceScene.media`, or `AMBIENT`
 
 
-def depth_through_media(truth: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
+def depth_through_media(reference: ReferenceScene, origin: Array, direction: Array, low: Array, high: Array) -> Array:
     """Return the optical depth of parts of rays where all media are homogeneous.
 
-    `truth`: the scene; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit vectors, (n, 3); `low`,
-    `high`: distances of the ends from the origin, (n,), finite [m]. Returns `tau`: optical depth of each channel, (n,
-    3), 0 where high <= low.
+    `reference`: the scene; `origin`: (n, 3), or (3,) for one that all share [m]; `direction`: unit vectors, (n, 3);
+    `low`, `high`: distances of the ends from the origin, (n,), finite [m]. Returns `tau`: optical depth of each
+    channel, (n, 3), 0 where high <= low.
 
     Valid for any points, inside or outside of the media.
     """
-    total = np.maximum(high - low, 0.0)[:, None] * truth.medium.sigma_t
-    for medium in truth.media:
+    total = np.maximum(high - low, 0.0)[:, None] * reference.medium.sigma_t
+    for medium in reference.media:
         enter, leave = crossings(medium.bounds, origin, direction)
         inside = np.maximum(np.minimum(leave, high) - np.maximum(enter, low), 0.0)
-        total += inside[:, None] * (medium.sigma_t - truth.medium.sigma_t)
+        total += inside[:, None] * (medium.sigma_t - reference.medium.sigma_t)
     return np.maximum(total, 0.0)
 
 
-def camera_segments(truth: ReferenceScene, distance: Array) -> Segments:
+def camera_segments(reference: ReferenceScene, distance: Array) -> Segments:
     """Return the parts of the camera rays before `distance`, (pixels,) [m], that lie in media that scatter.
 
     The slots of a ray hold the bodies in the order in which it passes them, and what lies before, between and behind.
     """
-    spans = [crossings(medium.bounds, truth.origin, truth.direction) for medium in truth.media]
+    spans = [crossings(medium.bounds, reference.origin, reference.direction) for medium in reference.media]
     enter, leave = np.array(spans).reshape(len(spans), 2, len(distance)).swapaxes(0, 1)
     enter, leave = np.maximum(enter, 0.0), np.minimum(leave, distance)
     # Bodies that a ray misses come last, as nothing at the end of the ray.
     enter, leave = np.where(enter < leave, enter, distance), np.where(enter < leave, leave, distance)
     order = np.argsort(enter, axis=0, kind="stable")
     enter, leave = np.take_along_axis(enter, order, axis=0), np.take_along_axis(leave, order, axis=0)
-    if not np.any(truth.medium.sigma_t * truth.medium.albedo > 0):
+    if not np.any(reference.medium.sigma_t * reference.medium.albedo > 0):
         return Segments(enter, leave, order)
     start = np.concatenate([np.zeros((1, len(distance))), leave, enter])
     end = np.concatenate([enter, distance[None], leave])

@@ -52,33 +52,35 @@ class SkyLight:
 
 
 def sky_light(
-    truth: ReferenceScene, hits: SurfaceHits, *, shapes: Shapes, plan: PointPlan, tell: Share = lambda share: None
+    reference: ReferenceScene, hits: SurfaceHits, *, shapes: Shapes, plan: PointPlan, tell: Share = lambda share: None
 ) -> SkyLight:
     """Compute what a uniform sky adds to airlight and surfaces along every ray.
 
-    `truth`: the scene, which has a sky; `hits`: what its rays hit; `shapes`: what can stand in the light; `plan`: the
-    most directions of a replicate, its seed, and whether surfaces get the light; `tell`: called with the share of the
-    work that is done.
+    `reference`: the scene, which has a sky; `hits`: what its rays hit; `shapes`: what can stand in the light; `plan`:
+    the most directions of a replicate, its seed, and whether surfaces get the light; `tell`: called with the share of
+    the work that is done.
     """
-    assert truth.sky is not None
+    assert reference.sky is not None
     count, most = len(hits.distance), min(plan.most, _MOST)
     replicates, bound = np.zeros((count, 6, REPLICATES)), np.zeros((count, 3))
     visible = np.flatnonzero(np.isfinite(hits.distance)) if plan.surfaces else np.empty(0, np.int64)
-    point = truth.origin + hits.distance[visible, None] * truth.direction[visible]
+    point = reference.origin + hits.distance[visible, None] * reference.direction[visible]
     start = np.zeros(len(visible))
-    left = np.exp(-optical_depth(truth, truth.origin, truth.direction[visible], start, hits.distance[visible]))
+    left = np.exp(
+        -optical_depth(reference, reference.origin, reference.direction[visible], start, hits.distance[visible])
+    )
     reflection = Reflection(hits.interaction)
     for replicate in range(REPLICATES):
         square = square_points(PointPlan(most=most, seed=plan.seed), _NUMBER, replicate, "sphere")
         for number, direction in enumerate(_directions(square)):
-            sun = DirectionalLight(direction, truth.sky * 4 * np.pi / most, None)
-            received = directional_airlight(truth, sun, hits.distance, shapes=shapes, checks=0)
+            sun = DirectionalLight(direction, reference.sky * 4 * np.pi / most, None)
+            received = directional_airlight(reference, sun, hits.distance, shapes=shapes, checks=0)
             replicates[:, :3, replicate] += received.radiance
             bound += received.bound / REPLICATES
             lit = received.reached[visible]
             row, towards = visible[lit], np.broadcast_to(-direction, (int(lit.sum()), 3))
             if len(row):
-                through = optical_depth(truth, point[lit], towards, start[lit], np.full(len(row), ENDLESS))
+                through = optical_depth(reference, point[lit], towards, start[lit], np.full(len(row), ENDLESS))
                 radiance = reflection(row, towards) * np.exp(-through) * left[lit] * sun.irradiance
                 replicates[row, 3:, replicate] += radiance
             tell((replicate + (number + 1) / most) / REPLICATES)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lit surface of the truth: Mitsuba's own materials and lights, attenuated in float64.
+"""The lit surface of the reference: Mitsuba's own materials and lights, attenuated in float64.
 
     L = f(w_i, w_o) cos I / r^2 exp(-sigma_t (distance + s r)),
 
@@ -37,11 +37,11 @@ class SurfaceHits:
     interaction: Any  #: Mitsuba's surface interactions
 
 
-def surface_hits(truth: ReferenceScene) -> SurfaceHits:
+def surface_hits(reference: ReferenceScene) -> SurfaceHits:
     """Cast the pixel-centre rays from the pinhole."""
-    ray = mi.Ray3f(mi.Point3f(*(float(c) for c in truth.origin)), dr.normalize(mi.Vector3f(truth.direction.T)))
+    ray = mi.Ray3f(mi.Point3f(*(float(c) for c in reference.origin)), dr.normalize(mi.Vector3f(reference.direction.T)))
     dr.make_opaque(ray)  # one kernel for all cameras
-    interaction = truth.occluders.ray_intersect(ray, mi.RayFlags.All, coherent=True)
+    interaction = reference.occluders.ray_intersect(ray, mi.RayFlags.All, coherent=True)
     dr.eval(interaction)  # whatever is read of it
     valid = np.array(interaction.is_valid(), dtype=bool)
     return SurfaceHits(np.where(valid, np.array(interaction.t, dtype=np.float64), np.inf), interaction)
@@ -61,26 +61,27 @@ class Reflection:
 
 
 def lit_surface(
-    truth: ReferenceScene, hits: SurfaceHits, *, reached: Sequence[NDArray[np.bool_]], shadow_scale: float = 1.0
+    reference: ReferenceScene, hits: SurfaceHits, *, reached: Sequence[NDArray[np.bool_]], shadow_scale: float = 1.0
 ) -> Array:
     """Return the radiance of the surface at each pixel centre that point, spot and directional lights give it.
 
     In W/(m^2 sr), (pixels, 3).
 
-    `truth`, `hits`: the scene and what its rays hit; `reached`: by light, the directional ones last, whether it reaches
-    the surface at the end of each ray, as its lit intervals say; `shadow_scale`: see `reference.quadrature.ray_values`.
+    `reference`, `hits`: the scene and what its rays hit; `reached`: by light, the directional ones last, whether it
+    reaches the surface at the end of each ray, as its lit intervals say; `shadow_scale`: see
+    `reference.quadrature.ray_values`.
     """
     interaction = hits.interaction
     total = np.zeros((len(hits.distance), 3))
-    if not truth.occluders.shapes():
+    if not reference.occluders.shapes():
         return total
     far = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
-    point = truth.origin + far[:, None] * truth.direction
-    to_camera = optical_depth(truth, truth.origin, truth.direction, np.zeros(len(far)), far)
-    emitters = [emitter for emitter in truth.scene.emitters() if not is_area(emitter)]
+    point = reference.origin + far[:, None] * reference.direction
+    to_camera = optical_depth(reference, reference.origin, reference.direction, np.zeros(len(far)), far)
+    emitters = [emitter for emitter in reference.scene.emitters() if not is_area(emitter)]
     emitters = sorted(emitters, key=is_directional)
     facing = interaction.is_valid()
-    lights: list[ReferenceLight | DirectionalLight] = [*truth.lights, *truth.directional]
+    lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for emitter, light, reaches in zip(emitters, lights, reached, strict=True):
         towards, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
@@ -91,7 +92,7 @@ def lit_surface(
             way = light.position - point
             r = np.linalg.norm(way, axis=1)
             way, r = way / np.maximum(r, np.finfo(float).tiny)[:, None], shadow_scale * r
-        depth = to_camera + optical_depth(truth, point, way, np.zeros(len(point)), r)
+        depth = to_camera + optical_depth(reference, point, way, np.zeros(len(point)), r)
         lit = np.array(facing, dtype=bool) & reaches
         total += np.where(lit[:, None], radiance * np.exp(-depth), 0.0)
     return total

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Directional lights of the ground truth, such as the sun: direction and irradiance, read from Mitsuba."""
+"""Directional lights of the reference, such as the sun: direction and irradiance, read from Mitsuba."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -156,14 +156,14 @@ def read_reference(scene) -> ReferenceScene:
     )
 
 
-def homogeneous_around(truth: ReferenceScene) -> ReferenceMedium:
+def homogeneous_around(reference: ReferenceScene) -> ReferenceMedium:
     """Return the medium without bounds, where it has one extinction.
 
     Raises InputError for height fog and grids.
     """
-    if isinstance(truth.medium, VaryingMedium):
+    if isinstance(reference.medium, VaryingMedium):
         raise InputError(NO_EXTINCTION)
-    return truth.medium
+    return reference.medium
 
 
 def _background(scene):
@@ -197,11 +197,11 @@ def _without(scene, background):
     return _rebuilt(scene, [each for each in scene.emitters() if each != background])
 
 
-def whole_scene(truth: ReferenceScene):
+def whole_scene(reference: ReferenceScene):
     """Return Mitsuba's scene with the sky, if it has one."""
-    if truth.sky is None:
-        return truth.scene
-    return _rebuilt(truth.scene, [*truth.scene.emitters(), truth.background])
+    if reference.sky is None:
+        return reference.scene
+    return _rebuilt(reference.scene, [*reference.scene.emitters(), reference.background])
 
 
 def _rebuilt(scene, emitters: list[Any]):

@@ -18,18 +18,18 @@ from reference.scene.shapes import Shapes, read_shapes
 IN_PLANE = 1e-7  #: of the largest coordinate: what is closer to the plane of a light counts as in it; float32 corners
 
 
-def before_light(truth: ReferenceScene, light: ReferenceAreaLight) -> tuple[ReferenceScene, Shapes]:
+def before_light(reference: ReferenceScene, light: ReferenceAreaLight) -> tuple[ReferenceScene, Shapes]:
     """Return the scene and the shapes that can shadow a light.
 
-    `truth`, `light`: the scene and one of its lights with extent.
+    `reference`, `light`: the scene and one of its lights with extent.
     """
-    shapes = truth.occluders.shapes()
+    shapes = reference.occluders.shapes()
     others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]
     if len(others) < len(shapes):
-        truth = replace(truth, occluders=scene_of(others, truth.scene))
-    known = read_shapes(truth.occluders)
+        reference = replace(reference, occluders=scene_of(others, reference.scene))
+    known = read_shapes(reference.occluders)
     if light.kind in ("rectangle", "disk"):
         largest = max(1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max()))
         before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
         known = replace(known, triangles=known.triangles[before.any(axis=1)])
-    return truth, known
+    return reference, known

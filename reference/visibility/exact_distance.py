@@ -16,12 +16,12 @@ from reference.visibility.line_crossings import half_chord
 Array = NDArray[np.float64]
 
 
-def exact_distance(truth: ReferenceScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
+def exact_distance(reference: ReferenceScene, interaction: Any, distance: Array, shapes: Shapes | None = None) -> Array:
     """Return the distances to the visible surface again in float64, where that is flat or a sphere.
 
-    `truth`: the scene; its rays are those that were cast; `interaction`: Mitsuba's surface interactions: which triangle
-    each ray met; `distance`: the distances that were found, (rays,), infinite where nothing is hit [m]; `shapes`: what
-    `read_shapes` returned, if known.
+    `reference`: the scene; its rays are those that were cast; `interaction`: Mitsuba's surface interactions: which
+    triangle each ray met; `distance`: the distances that were found, (rays,), infinite where nothing is hit [m];
+    `shapes`: what `read_shapes` returned, if known.
 
     Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, the
     distance stays what it was. So it does on spheres that a ray misses in float64, which happens where it touches them.
@@ -30,20 +30,22 @@ def exact_distance(truth: ReferenceScene, interaction: Any, distance: Array, sha
     shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))
     primitive = np.array(interaction.prim_index, dtype=np.int64)
     refined = distance.copy()
-    for shape, part in (shapes or read_shapes(truth.occluders)).single:
+    for shape, part in (shapes or read_shapes(reference.occluders)).single:
         number = np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))).item()
         mine = np.flatnonzero(hit & (shape_of_hit == number))
         if not len(mine):
             continue
         if isinstance(part, Sphere):
-            refined[mine] = _to_sphere(part, truth.origin, truth.direction[mine], distance[mine])
+            refined[mine] = _to_sphere(part, reference.origin, reference.direction[mine], distance[mine])
             continue
         if isinstance(part, Disks):
-            refined[mine] = _along(part.centre - truth.origin, part.normal, truth.direction[mine], distance[mine])
+            refined[mine] = _along(
+                part.centre - reference.origin, part.normal, reference.direction[mine], distance[mine]
+            )
             continue
         # A rectangle counts as one primitive; both its triangles lie in one plane.
         number_in_shape = 0 * mine if is_rectangle(shape) else primitive[mine]
-        refined[mine] = to_plane(part[number_in_shape] - truth.origin, truth.direction[mine], distance[mine])
+        refined[mine] = to_plane(part[number_in_shape] - reference.origin, reference.direction[mine], distance[mine])
     return refined
 
 

@@ -32,15 +32,15 @@ class Obstacles:
     light: Ball  #: what holds the light
 
 
-def obstacles(truth: ReferenceScene, light: Ball, distance: Array, shapes: Shapes | None = None) -> Obstacles:
+def obstacles(reference: ReferenceScene, light: Ball, distance: Array, shapes: Shapes | None = None) -> Obstacles:
     """Return what can stand between a light and the rays of a scene.
 
-    `truth`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,), may be infinite [m];
-    `shapes`: what `reference.scene.shapes.read_shapes` returned for its occluders, if known.
+    `reference`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,), may be infinite
+    [m]; `shapes`: what `reference.scene.shapes.read_shapes` returned for its occluders, if known.
     """
-    shapes = read_shapes(truth.occluders) if shapes is None else shapes
-    near = near_shapes(light, truth.origin, truth.direction, distance, shapes)
-    return Obstacles(truth.occluders, shapes, near, light)
+    shapes = read_shapes(reference.occluders) if shapes is None else shapes
+    near = near_shapes(light, reference.origin, reference.direction, distance, shapes)
+    return Obstacles(reference.occluders, shapes, near, light)
 
 
 def lit_intervals(

@@ -274,7 +274,7 @@ def _with_scene(
         raise InputError("mask: an image is compared with a scene under a mask that is an EXR file; save it first")
     with telling(progress, "the reference") as tell:
         compared = compare_scene(scene, path, mask=mask, progress=tell, **options)
-    images = compared.truth, compared.image
+    images = compared.reference, compared.image
     said = tuple((str(file), write_difference(file, *images, kept=_mask(mask))) for file in files)
     return SceneComparison(compared, said)
 

@@ -137,7 +137,7 @@ def fog(tmp_path):
 
 @pytest.mark.claim("own-method")
 def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
-    """Steps in the angle without shifts are `ray-march`; twice as many come closer to the truth."""
+    """Steps in the angle without shifts are `ray-march`; twice as many come closer to the reference."""
 
     from realtime.scene.read_scene import read_scene
     from validation.estimates.quadrature import reference_image

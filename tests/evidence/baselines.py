@@ -77,19 +77,19 @@ def measure_baseline(name: str) -> dict[str, Any]:
     """Measure what the baseline of a built-in scene holds, without revision and reason."""
     loaded = load_scene(name, SIZE)
     scene = read_scene(loaded.scene)
-    truth = reference_image(loaded.scene)
+    reference = reference_image(loaded.scene)
     chosen = baseline_configurations(name, scene.features)
     return {
         "scene": name,
         "size": list(SIZE),
-        "truth": {layer: _rounded({"mean": getattr(truth, layer).mean()}) for layer in ("airlight", "surface")},
-        "configurations": {each.label: _entry(scene, each, truth) for each in chosen},
+        "reference": {layer: _rounded({"mean": getattr(reference, layer).mean()}) for layer in ("airlight", "surface")},
+        "configurations": {each.label: _entry(scene, each, reference) for each in chosen},
     }
 
 
-def _entry(scene: Scene, chosen: Configuration, truth: ReferenceImage) -> dict[str, Any]:
+def _entry(scene: Scene, chosen: Configuration, reference: ReferenceImage) -> dict[str, Any]:
     """Return the errors of one configuration, or why it was refused."""
-    row, frame = run(Cell("", SIZE, (), chosen, Measure("none", every_metric=False)), scene, of_image(truth))
+    row, frame = run(Cell("", SIZE, (), chosen, Measure("none", every_metric=False)), scene, of_image(reference))
     if row.error is None or frame is None:
         return {"refused": row.reason}
     numbers = plain(row.error) | {"mean": float(np.mean(np.asarray(frame.airlight, dtype=np.float64)))}
@@ -116,7 +116,9 @@ def compare_baseline(kept: Baseline | None, measured: Baseline) -> list[Move]:
         moves.append(Move(scene, "", f"size: {kept['size']} before, {measured['size']} now"))
     for layer in ("airlight", "surface"):
         # The reference is float64: it has no band, and no floor.
-        moves += _numbers(scene, "", f"truth of the {layer}", kept["truth"][layer], measured["truth"][layer], 0.0, 0)
+        moves += _numbers(
+            scene, "", f"reference of the {layer}", kept["reference"][layer], measured["reference"][layer], 0.0, 0
+        )
     before, after = kept["configurations"], measured["configurations"]
     moves += [Move(scene, label, "a baseline without its configuration") for label in before if label not in after]
     moves += [Move(scene, label, "a configuration without baseline") for label in after if label not in before]

@@ -173,13 +173,13 @@ def reference_of(scene: Scene | FogScene) -> ReferenceScene:
     return read_reference(load_fog(mitsuba_dict(scene) if isinstance(scene, FogScene) else scene))
 
 
-def layers(truth: ReferenceScene, estimator: str = "quadrature") -> np.ndarray:
+def layers(reference: ReferenceScene, estimator: str = "quadrature") -> np.ndarray:
     """Return airlight and surface by an estimator, (2, pixels, 3) [W/(m^2 sr)]."""
     if estimator == "quadrature":
-        image = quadrature_image(truth, plan=PLAN)
+        image = quadrature_image(reference, plan=PLAN)
         return np.stack([image.airlight, image.surface]).reshape(2, -1, 3)
     batch = single_scatter_batch if estimator == "single-scatter" else volpath_batch
-    return batch(truth, 1, _SAMPLES).mean
+    return batch(reference, 1, _SAMPLES).mean
 
 
 def airlight(scene: Scene, estimator: str = "quadrature") -> np.ndarray:

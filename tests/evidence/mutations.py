@@ -44,9 +44,9 @@ class Mutation:
 def _sums(change: Callable[..., Any]) -> Wrap:
     """Change the airlight of one light: change(medium, radiance)."""
 
-    def around(function, truth, *others, **named):
-        radiance, bound = function(truth, *others, **named)
-        return change(truth.medium, radiance), bound
+    def around(function, reference, *others, **named):
+        radiance, bound = function(reference, *others, **named)
+        return change(reference.medium, radiance), bound
 
     return Wrap("reference.quadrature.light_airlight:lit_sums", around)
 
@@ -55,9 +55,9 @@ def _brighter(factor: float) -> Wrap:
     return _sums(lambda medium, radiance: radiance * factor)
 
 
-def _first_extinction(function, truth, *others, **named):
-    medium = truth.medium
-    first = replace(truth, medium=replace(medium, sigma_t=np.full(3, medium.sigma_t[0])))
+def _first_extinction(function, reference, *others, **named):
+    medium = reference.medium
+    first = replace(reference, medium=replace(medium, sigma_t=np.full(3, medium.sigma_t[0])))
     return tuple(values * medium.sigma_t / medium.sigma_t[0] for values in function(first, *others, **named))
 
 
@@ -66,7 +66,7 @@ def _stretches(change: Callable[..., Any]) -> Wrap:
 
     def around(function, field, rays, stretches, distance, terms):
         ray, x0, x1 = stretches
-        x0, x1 = change(rays, x0, x1, field.truth.medium.sigma_t[0])
+        x0, x1 = change(rays, x0, x1, field.reference.medium.sigma_t[0])
         return function(field, rays, (ray, x0, np.maximum(x0, x1)), distance, terms)
 
     return Wrap(_FIELD, around)
@@ -76,7 +76,7 @@ def _terms(change: Callable[..., Any]) -> Wrap:
     """Change how lights shine: change(terms, rays, sigma_t) -> changes of the terms."""
 
     def around(function, field, rays, stretches, distance, terms):
-        terms = replace(terms, **change(terms, rays, field.truth.medium.sigma_t[0]))
+        terms = replace(terms, **change(terms, rays, field.reference.medium.sigma_t[0]))
         return function(field, rays, stretches, distance, terms)
 
     return Wrap(_FIELD, around)
@@ -131,9 +131,9 @@ def _linear_in_cosine(function, theta, rays, light):
     return (cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff))
 
 
-def _one_light(function, truth, light, *others, **named):
-    found = function(truth, light, *others, **named)
-    return found if light is truth.lights[0] else replace(found, radiance=0 * found.radiance)
+def _one_light(function, reference, light, *others, **named):
+    found = function(reference, light, *others, **named)
+    return found if light is reference.lights[0] else replace(found, radiance=0 * found.radiance)
 
 
 def _lit(change: Callable[..., Any]) -> Wrap:
@@ -174,37 +174,37 @@ def _shifted(lit, low, high):
     return [(a + 0.01 * (a > low), min(high, b + 0.01 * (b < high))) for a, b in lit]
 
 
-def _behind(function, truth, light, rays, lit, *others, **named):
+def _behind(function, reference, light, rays, lit, *others, **named):
     high = np.where(rays.foot[lit.ray] > 0, lit.high, lit.low)
-    return function(truth, light, rays, replace(lit, high=high), *others, **named)
+    return function(reference, light, rays, replace(lit, high=high), *others, **named)
 
 
 def _surface(change: Callable[..., Any]) -> Wrap:
-    """Change the lit surface: change(function, truth, hits, named)."""
+    """Change the lit surface: change(function, reference, hits, named)."""
     return Wrap(
         "reference.quadrature.surface:lit_surface",
-        lambda function, truth, hits, **named: change(function, truth, hits, named),
+        lambda function, reference, hits, **named: change(function, reference, hits, named),
     )
 
 
-def _without_cosine(function, truth, hits, named):
-    (light,) = truth.lights
+def _without_cosine(function, reference, hits, named):
+    (light,) = reference.lights
     towards = hits.interaction.to_local(dr.normalize(mi.Point3f(*map(float, light.position)) - hits.interaction.p))
     cosine = np.array(mi.Frame3f.cos_theta(towards), dtype=float)[:, None]
-    return function(truth, hits, **named) / np.where(np.abs(cosine) > 0, cosine, 1)
+    return function(reference, hits, **named) / np.where(np.abs(cosine) > 0, cosine, 1)
 
 
-def _to_camera(truth, hits):
-    return np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * truth.medium.sigma_t
+def _to_camera(reference, hits):
+    return np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * reference.medium.sigma_t
 
 
-def _no_shadow_leg(function, truth, hits, named):
-    return function(truth, hits, **named | {"shadow_scale": 0.0})
+def _no_shadow_leg(function, reference, hits, named):
+    return function(reference, hits, **named | {"shadow_scale": 0.0})
 
 
-def _all_reached(function, truth, hits, named):
-    everywhere = [np.ones(len(hits.distance), bool)] * len(truth.lights)
-    return function(truth, hits, **named | {"reached": everywhere})
+def _all_reached(function, reference, hits, named):
+    everywhere = [np.ones(len(hits.distance), bool)] * len(reference.lights)
+    return function(reference, hits, **named | {"reached": everywhere})
 
 
 def _sun(change: Callable[..., Any]) -> Wrap:
@@ -246,8 +246,8 @@ def _one_too_few(function, *arguments, plan, **named):
     return replace(found, replicates=found.replicates * plan.most / (plan.most - 1))
 
 
-def _own_shape(function, truth, light):
-    scene, shapes = function(truth, replace(light, shape=None))
+def _own_shape(function, reference, light):
+    scene, shapes = function(reference, replace(light, shape=None))
     return scene, shapes
 
 
@@ -354,15 +354,17 @@ _FOG = _all(
         ),
         "through-surfaces": Wrap(
             "reference.quadrature.light_airlight:light_airlight",
-            lambda function, truth, light, distance, **how: function(truth, light, distance + np.inf, **how),
+            lambda function, reference, light, distance, **how: function(reference, light, distance + np.inf, **how),
         ),
         "surface-bright-shadow-leg": _surface(_no_shadow_leg),
         "surface-bright-camera-leg": _surface(
-            lambda function, truth, hits, named: function(truth, hits, **named) * np.exp(_to_camera(truth, hits))
+            lambda function, reference, hits, named: (
+                function(reference, hits, **named) * np.exp(_to_camera(reference, hits))
+            )
         ),
         "surface-wrong-leg": _surface(
-            lambda function, truth, hits, named: (
-                _no_shadow_leg(function, truth, hits, named) * np.exp(-_to_camera(truth, hits))
+            lambda function, reference, hits, named: (
+                _no_shadow_leg(function, reference, hits, named) * np.exp(-_to_camera(reference, hits))
             )
         ),
         "surface-without-shadows": _surface(_all_reached),

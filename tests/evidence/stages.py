@@ -88,21 +88,21 @@ def stage_scene(name: str) -> Any:
 def stage_of(name: str) -> Stage:
     """Return a stage; single-scatter runs until its intervals are narrow enough, whatever they say."""
     scene, margins = stage_scene(name), dict(zip(LAYERS, MARGINS[name]))
-    truth = read.read_reference(scene)
-    image = quadrature.quadrature_image(truth, plan=PLAN)
-    masks = {layer: mask for layer, mask in layer_masks(truth, image).items() if np.any(getattr(image, layer) > 0)}
-    batches = _batches(truth, range(_LEAST))
+    reference = read.read_reference(scene)
+    image = quadrature.quadrature_image(reference, plan=PLAN)
+    masks = {layer: mask for layer, mask in layer_masks(reference, image).items() if np.any(getattr(image, layer) > 0)}
+    batches = _batches(reference, range(_LEAST))
     most = _MOST_WIDE if name in WIDE_PROBES else _MOST
     while len(batches.seeds) < most and not all(
         width_to_reach(_statistics(image, batches, layer, mask, margins[layer]), margins[layer]) < 1
         for layer, mask in masks.items()
     ):
-        batches = merged(batches, _batches(truth, range(len(batches.seeds), 2 * len(batches.seeds))))
+        batches = merged(batches, _batches(reference, range(len(batches.seeds), 2 * len(batches.seeds))))
     return Stage(scene, image, masks, margins, batches)
 
 
-def _batches(truth, seeds: range) -> Batches:
-    return reduce(merged, (single_scatter.single_scatter_batch(truth, seed, _DISTANCES) for seed in seeds))
+def _batches(reference, seeds: range) -> Batches:
+    return reduce(merged, (single_scatter.single_scatter_batch(reference, seed, _DISTANCES) for seed in seeds))
 
 
 def _statistics(image: ReferenceImage, batches: Batches, layer: str, mask: Any, margin: float):
@@ -115,12 +115,12 @@ def seen(estimator: str, mutation: Mutation | None, stage: Stage) -> Iterator[Si
     # A fault may divide by zero or overflow: its image shows that.
     with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        truth = read.read_reference(stage.scene)
+        reference = read.read_reference(stage.scene)
         image, batches = stage.image, stage.batches
         if estimator == "quadrature":
-            image = quadrature.quadrature_image(truth, plan=PLAN)
+            image = quadrature.quadrature_image(reference, plan=PLAN)
         else:
-            batches = _batches(truth, range(len(batches.seeds)))
+            batches = _batches(reference, range(len(batches.seeds)))
     against = "single-scatter" if estimator == "quadrature" else "quadrature"
     for layer, mask in stage.masks.items():
         yield _sighting(image, batches, layer, mask, stage.margins[layer], against)
@@ -137,8 +137,8 @@ def _sighting(image: ReferenceImage, batches: Batches, layer: str, mask: Any, ma
 
 def volpath_seen(mutation: Mutation | None, stage: Stage, batches: int) -> list[Sighting]:
     """Compare a quadrature that may be changed with volpath, over its shortened shadow rays."""
-    truth = read.read_reference(stage.scene)
-    traced = reduce(merged, (volpath.volpath_batch(truth, seed, _SAMPLES) for seed in range(batches)))
+    reference = read.read_reference(stage.scene)
+    traced = reduce(merged, (volpath.volpath_batch(reference, seed, _SAMPLES) for seed in range(batches)))
     with injected(*([mutation.change] if mutation else [])), np.errstate(all="ignore"):
         image = quadrature.quadrature_image(read.read_reference(stage.scene), shadow_scale=1 - measure_shadow_epsilon())
     return [_sighting(image, traced, layer, mask, VOLPATH_MARGIN, "volpath") for layer, mask in stage.masks.items()]

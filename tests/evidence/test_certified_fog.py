@@ -61,10 +61,10 @@ def bound(scene):
 
 def reference_of(scene):
     """Read the file's Mitsuba scene; its lights must be those of the file, bit by bit."""
-    truth = read_reference(load_fog(scene["mitsuba"]))
-    for light, given in zip(truth.lights, scene["lights"], strict=True):
+    reference = read_reference(load_fog(scene["mitsuba"]))
+    for light, given in zip(reference.lights, scene["lights"], strict=True):
         assert np.array_equal(light.intensity, np.array(given["intensity"], dtype=float))
-    return truth
+    return reference
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -173,7 +173,7 @@ def test_all_rows_again(area_rows):
 
 @pytest.mark.claim("area-light-certified", tolerance="1e-10 relative: Gauss-Kronrod's own")
 @pytest.mark.parametrize("number", range(len(area_lights.POINTS)))
-def test_the_truth_of_one_point(area_rows, number):
+def test_the_reference_of_one_point(area_rows, number):
     row = area_rows["points"][number]
     phase = PhaseFunction("isotropic") if row["g"] is None else PhaseFunction("hg", g=row["g"])
     medium = ReferenceMedium(np.full(3, row["sigma_t"]), np.ones(3), phase, None)

@@ -55,7 +55,7 @@ def variations():
 
 
 def twin_error(description, size):
-    """Return the error of the twin of a scene against the truth."""
+    """Return the error of the twin of a scene against the reference."""
     scene = mi.load_dict(description)
     return error_metrics(reference_image(scene).airlight, oracle_airlight(read_reference(scene), maps_of(scene, size)))
 
@@ -84,23 +84,25 @@ def plane_below(depth, size):
 @pytest.mark.parametrize("surface", [np.inf, 3.7])
 def test_shadow_of_a_plane_is_exact(variant, level, surface):
     """Rays that start at 1.3 m are lit where they are above the plane, up to the visible surface."""
-    truth = read_reference(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
-    light, direction = truth.lights[0], truth.direction
+    reference = read_reference(mi.load_dict(tiny_scene(size=(24, 18), ball=None, floor=None)))
+    light, direction = reference.lights[0], reference.direction
     airlight = oracle_airlight(
-        truth, [plane_below(light.position[2] - level, 8)], distance=np.full((truth.height, truth.width), surface)
+        reference,
+        [plane_below(light.position[2] - level, 8)],
+        distance=np.full((reference.height, reference.width), surface),
     )
-    reaches = (level - truth.origin[2]) / direction[:, 2]
+    reaches = (level - reference.origin[2]) / direction[:, 2]
     meets = (reaches > 0) & (reaches < surface)
     assert 0.1 < np.mean(meets) < 0.9
     crossing = np.where(meets, reaches, 0.0)
-    if truth.origin[2] > level:
+    if reference.origin[2] > level:
         x0, x1 = np.zeros(len(meets)), np.where(meets, crossing, surface)
     else:
         x0, x1 = crossing, np.where(meets, surface, 0.0)
-    foot, height = foot_and_height(np.broadcast_to(truth.origin, direction.shape), direction, light.position)
-    sigma_t = truth.medium.sigma_t[0]
-    J, _ = airlight_segments(foot, height, x0, x1, sigma_t, truth.medium.phase)
-    expected = J[:, None] * truth.medium.albedo * sigma_t * light.intensity / (4 * np.pi)
+    foot, height = foot_and_height(np.broadcast_to(reference.origin, direction.shape), direction, light.position)
+    sigma_t = reference.medium.sigma_t[0]
+    J, _ = airlight_segments(foot, height, x0, x1, sigma_t, reference.medium.phase)
+    expected = J[:, None] * reference.medium.albedo * sigma_t * light.intensity / (4 * np.pi)
     # The angles of crossings are rounded, the integrals right to 1e-10.
     assert airlight.reshape(-1, 3) == pytest.approx(expected, rel=1e-9, abs=1e-10 * expected.max())
 

@@ -123,11 +123,11 @@ def test_no_light_leaves_a_closed_box(variant, name, estimator):
 # --- Closed forms: media ---
 
 
-def floor_distance(truth) -> np.ndarray:
+def floor_distance(reference) -> np.ndarray:
     """Return where rays meet the floor z = 0, a parallelogram."""
     with np.errstate(divide="ignore"):
-        distance = -truth.origin[2] / truth.direction[:, 2]
-    point = truth.origin + np.where(distance > 0, distance, 0)[:, None] * truth.direction
+        distance = -reference.origin[2] / reference.direction[:, 2]
+    point = reference.origin + np.where(distance > 0, distance, 0)[:, None] * reference.direction
     u, v = (np.array(edge[:2]) for edge in floor().half_edges)
     share = np.linalg.solve(np.stack([u, v], axis=1), (point[:, :2] - np.array(floor().centre[:2])).T)
     return np.where((distance > 0) & np.all(np.abs(share) < 1, axis=0), distance, np.inf)
@@ -137,17 +137,17 @@ def floor_distance(truth) -> np.ndarray:
 def test_the_limit_of_a_vacuum(variant):
     """As sigma_t goes to 0, L / (albedo sigma_t I / (4 pi)) goes to int dx / r^2 = (theta1 - theta0)/h."""
     sigma_t = 2.0**-40
-    truth = reference_of(
+    reference = reference_of(
         replace(fog_scene(), lights=fog_scene().lights[:1], occluders=(floor(),), sigma_t=(sigma_t,) * 3)
     )
-    (light,) = truth.lights
-    foot, height = foot_and_height(truth.origin, truth.direction, light.position)
-    end = floor_distance(truth)
+    (light,) = reference.lights
+    foot, height = foot_and_height(reference.origin, reference.direction, light.position)
+    end = floor_distance(reference)
     theta1 = np.where(np.isfinite(end), np.arctan2(np.where(np.isfinite(end), end, 0) - foot, height), math.pi / 2)
     expected = (theta1 - np.arctan2(-foot, height)) / height
-    factor = truth.medium.albedo * sigma_t * light.intensity / (4 * math.pi)
+    factor = reference.medium.albedo * sigma_t * light.intensity / (4 * math.pi)
     # In each pixel the tolerance of the integrals; the medium itself is worth 1e-11.
-    np.testing.assert_allclose(layers(truth)[0], expected[:, None] * factor, rtol=2e-10)
+    np.testing.assert_allclose(layers(reference)[0], expected[:, None] * factor, rtol=2e-10)
     assert np.all(airlight(mitsuba_dict(replace(fog_scene(), sigma_t=(0.0, 0.0, 0.0)))) == 0)
 
 
@@ -215,18 +215,18 @@ def test_a_box_of_fog_under_vertical_light(variant):
     """
     scene = {name: entry for name, entry in sun().items() if name != "slab"}
     scene["sun"] = scene["sun"] | {"to_world": {"matrix": np.diag([1.0, -1, -1, 1]).tolist()}}
-    truth = reference_of(scene)
-    (medium,), (light,) = truth.media, truth.directional
+    reference = reference_of(scene)
+    (medium,), (light,) = reference.media, reference.directional
     with np.errstate(divide="ignore"):
-        lower, upper = ((BOX[0] + sign * BOX[1] - truth.origin) / truth.direction for sign in (-1, 1))
+        lower, upper = ((BOX[0] + sign * BOX[1] - reference.origin) / reference.direction for sign in (-1, 1))
     low, high = np.minimum(lower, upper).max(axis=1), np.maximum(lower, upper).min(axis=1)
     length = np.maximum(high - low, 0.0)[:, None]
-    rise = truth.direction[:, 2:]
-    above = BOX[0][2] + BOX[1][2] - truth.origin[2] - low[:, None] * rise
+    rise = reference.direction[:, 2:]
+    above = BOX[0][2] + BOX[1][2] - reference.origin[2] - low[:, None] * rise
     p = (1 - G**2) / (1 + G**2 - 2 * G * rise) ** 1.5
     integral = np.exp(-medium.sigma_t * above) * -np.expm1(-medium.sigma_t * (1 - rise) * length) / (1 - rise)
     expected = medium.albedo * light.irradiance * p / (4 * math.pi) * np.where(length > 0, integral, 0.0)
-    assert difference(layers(truth)[0], expected) <= 1e-13  # float64 rounding
+    assert difference(layers(reference)[0], expected) <= 1e-13  # float64 rounding
 
 
 # --- Closed forms: area lights ---
@@ -235,13 +235,15 @@ def test_a_box_of_fog_under_vertical_light(variant):
 @pytest.fixture(scope="module")
 def lit(variant):
     """The rectangle of `panel` without occluders, and eight rays."""
-    truth = reference_of(panel())
-    return replace(truth, occluders=load_fog({"type": "scene"}), direction=truth.direction[4::8], width=8, height=1)
+    reference = reference_of(panel())
+    return replace(
+        reference, occluders=load_fog({"type": "scene"}), direction=reference.direction[4::8], width=8, height=1
+    )
 
 
-def by_points(truth, light, count: int) -> np.ndarray:
+def by_points(reference, light, count: int) -> np.ndarray:
     plan = PointPlan(error=0.0, first=count, most=count)
-    return ray_values(replace(truth, area=(light,)), plan=plan).airlight
+    return ray_values(replace(reference, area=(light,)), plan=plan).airlight
 
 
 @pytest.mark.claim("known-answers")
@@ -282,13 +284,13 @@ def test_what_a_polygon_leaves_of_a_light(variant, kind, corners):
 
     Of a disk a half plane leaves 1 - (acos u - u sqrt(1 - u^2))/pi, of a rectangle a triangle what clipping leaves.
     """
-    truth = reference_of(panel(kind))
+    reference = reference_of(panel(kind))
     half = np.array([0.625, 0.375]) if kind == "rectangle" else np.full(2, 0.5)
     middle = np.array([0.125, 0.25])
-    light = replace(truth.area[0], centre=np.array([*middle, 4.0]), half=half, frame=np.diag([1.0, 1.0, -1.0]))
-    truth = replace(truth, area=(light,), occluders=lid(corners, 2.0))
+    light = replace(reference.area[0], centre=np.array([*middle, 4.0]), half=half, frame=np.diag([1.0, 1.0, -1.0]))
+    reference = replace(reference, area=(light,), occluders=lid(corners, 2.0))
     place = np.array([[-0.375, 0.25, 0], [-0.1875, 0.125, 0], [0.0, 0.0625, 0], [0.125, 0.25, 0], [0.3125, 0.125, 0]])
-    share = visible_share(truth, place, [0.0, 0.0, 1.0], 4096).mean(axis=1)
+    share = visible_share(reference, place, [0.0, 0.0, 1.0], 4096).mean(axis=1)
     # A corner at half the height is twice as far from the foot of the point where it falls on the light's plane.
     fallen = [foot + 2 * (corners - foot) - middle for foot in place[:, :2]]
     if kind == "disk":

@@ -113,9 +113,9 @@ def airlight_sum(
     return total * light.strength / (4 * np.pi)
 
 
-def bodies_of(truth: Any, chords: dict[str, Chord]) -> tuple[list[Body], Body | None]:
+def bodies_of(reference: Any, chords: dict[str, Chord]) -> tuple[list[Body], Body | None]:
     """Return the media of a scene of the reference, whose bounds have these chords by name, and what is around them."""
-    bodies = [Body(chords[each.name], each.sigma_t, each.albedo, each.phase) for each in truth.media]
-    outside = truth.medium
+    bodies = [Body(chords[each.name], each.sigma_t, each.albedo, each.phase) for each in reference.media]
+    outside = reference.medium
     everywhere = Body(ball((0, 0, 0), np.inf), outside.sigma_t, outside.albedo, outside.phase)
     return bodies, everywhere if outside.sigma_t.any() else None

@@ -98,16 +98,16 @@ def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> 
     return read_reference(lit_scene(size=size, to_world=camera, medium=medium, lamp=light, **chosen))
 
 
-def visible_share(truth: ReferenceScene, place, normal, samples: int):
+def visible_share(reference: ReferenceScene, place, normal, samples: int):
     """Return the share of the area of the first light, a flat one, that surface points see, (points, replicates) [1].
 
     A camera looks down on each point along its normal.
     """
-    light, result = truth.area[0], np.zeros((len(place), REPLICATES))
-    _, shapes = before_light(truth, light)
+    light, result = reference.area[0], np.zeros((len(place), REPLICATES))
+    _, shapes = before_light(reference, light)
     normal = np.asarray(normal, dtype=float)
     for number, point in enumerate(np.asarray(place, dtype=float)):
-        down = replace(truth, origin=point + normal, direction=-normal[None])
+        down = replace(reference, origin=point + normal, direction=-normal[None])
         known = obstacles(down, Ball(light.centre, light.radius), np.ones(1), shapes)
         for replicate in range(REPLICATES):
             plan = PointPlan(most=samples)
@@ -126,12 +126,12 @@ def fixed(points: int, seed: int = 0) -> PointPlan:
     return PointPlan(error=0.0, first=points, most=points, seed=seed)
 
 
-def area_airlight_of(truth: ReferenceScene, plan: PointPlan, distance=None) -> AreaAirlight:
+def area_airlight_of(reference: ReferenceScene, plan: PointPlan, distance=None) -> AreaAirlight:
     """Return the airlight of the area lights of a scene along its rays up to their surfaces, or to a distance [m]."""
-    distance = surface_hits(truth).distance if distance is None else distance
-    return area_airlight(truth, beams_of(truth, distance), np.zeros((len(distance), 3)), plan=plan)
+    distance = surface_hits(reference).distance if distance is None else distance
+    return area_airlight(reference, beams_of(reference, distance), np.zeros((len(distance), 3)), plan=plan)
 
 
-def airlight_replicates(truth: ReferenceScene, plan: PointPlan, distance=None):
+def airlight_replicates(reference: ReferenceScene, plan: PointPlan, distance=None):
     """Return the same as replicates alone, (rays, 3, replicates) [W/(m^2 sr)]."""
-    return area_airlight_of(truth, plan, distance).replicates
+    return area_airlight_of(reference, plan, distance).replicates

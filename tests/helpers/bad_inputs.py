@@ -228,7 +228,7 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
     sampled = ["--error", "0.3", "--estimator"]
     orders = [
         ["describe", str(path), "--json"],
-        ["reference", str(path), "--json", "-o", str(out / "truth.exr")],
+        ["reference", str(path), "--json", "-o", str(out / "reference.exr")],
         ["reference", str(path), "--json", "-o", str(out / "sampled.exr"), *sampled, "single-scatter"],
         ["reference", str(path), "--json", "-o", str(out / "traced.exr"), "--samples", "64", "--estimator", "volpath"],
     ]
@@ -239,7 +239,7 @@ def _orders(kind: str, path: Path) -> list[list[str]]:
         settings += ["--set", "shadow=map"] if number == 1 else []
         file = out / f"frame-{number}.exr"
         orders.append(["render", str(path), "--json", "--method", method, "-o", str(file), *settings])
-    orders.append(["compare", str(out / "truth.exr"), str(out / "frame-0.exr"), "--json"])
+    orders.append(["compare", str(out / "reference.exr"), str(out / "frame-0.exr"), "--json"])
     asked = ["--quick", str(path), "--method", "unshadowed", "--method", "ray-march", "--json"]
     return [*orders, ["report", *asked, "-o", str(out / "study")]]
 

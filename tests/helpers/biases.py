@@ -4,7 +4,7 @@
 import numpy as np
 
 
-def biases(truth, image, batches):
+def biases(reference, image, batches):
     """Relative biases of airlight and surface, pixels near the lamp left out, and half of their 95 % intervals."""
     away = (image.light_angle > 0.12)[..., None]
     found = []

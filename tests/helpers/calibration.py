@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Do the statistical tests do what they say? Synthetic images with a known truth, judged like real ones.
+r"""Do the statistical tests do what they say? Synthetic images with a known reference, judged like real ones.
 
 An image is a profile, dim by a factor of a hundred from one side to the other, times 1 + bias. Each of its K batches
 has in every pixel a relative error of the standard deviation `spread`, drawn from a law of mean 0 and deviation 1; mean
 and standard error follow from the batches as a renderer's do. Then
 
-* without a bias (`calibrate`) each test must reject as often as its level says, the intervals must hold the truth as
-  often as they say, and the p-values of many comparisons must be uniform (Kolmogorov and Smirnov);
+* without a bias (`calibrate`) each test must reject as often as its level says, the intervals must hold the true value
+  as often as they say, and the p-values of many comparisons must be uniform (Kolmogorov and Smirnov);
 * with a bias (`power_and_finds`) the share of comparisons that find it must be the power that each of them predicts
   from its own standard error.
 
@@ -64,7 +64,7 @@ EXPECTED = {
     "exceeding": LEVEL,  # values below the level
     "exceeding_alarms": LEVEL,  # with `exceeding_p` below it
     "uniformity_alarms": LEVEL,
-    "coverage": 0.95,  # whose 95 % interval holds the truth, from the standard errors
+    "coverage": 0.95,  # whose 95 % interval holds the true value, from the standard errors
     "coverage_batches": 0.95,  # from the batch means
 }
 
@@ -128,7 +128,7 @@ def share_interval(probability: float, trials: int, level: float) -> tuple[float
 
 def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Statistics]:
     rng = np.random.default_rng(experiment.seed)
-    truth = _profile(experiment.size)
+    profile = _profile(experiment.size)
 
     def estimate(image: Array) -> Estimate:
         """Return what a renderer gives of an image: mean, standard error and batch means."""
@@ -138,8 +138,8 @@ def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Sta
 
     comparisons = []
     for _ in range(experiment.runs):
-        test = estimate((1 + bias) * truth)
-        reference = estimate(truth) if experiment.noisy_reference else Estimate(truth)
+        test = estimate((1 + bias) * profile)
+        reference = estimate(profile) if experiment.noisy_reference else Estimate(profile)
         comparisons.append(compare_statistics(reference, test, family_level=LEVEL, plain_level=LEVEL))
     return comparisons
 

@@ -43,9 +43,9 @@ def frame(scene: dict[str, Any], method: str = "unshadowed", **options: Any):
     return _once(("frame", scene, method, options), lambda: render(scene, method, **options))
 
 
-def truth(scene: dict[str, Any]):
+def reference_of(scene: dict[str, Any]):
     """Return the image of the quadrature reference, which shares no code with the methods."""
-    return _once(("truth", scene), lambda: quadrature_image(read_reference(mi.load_dict(scene))))
+    return _once(("reference", scene), lambda: quadrature_image(read_reference(mi.load_dict(scene))))
 
 
 def relative_rmse(values: Any, expected: Any) -> float:

@@ -103,7 +103,7 @@ DATA: dict[str, Any] = report_of(
     computed=9,
     settings=settings(image=[WIDTH, HEIGHT], timed=[64, 48]),
     claims=[
-        {"kind": "reference", "text": "The truth is confirmed.", "good": True},
+        {"kind": "reference", "text": "The reference is confirmed.", "good": True},
         {"kind": "left-out", "text": "Every method here scatters once.", "good": None},
     ],
 )

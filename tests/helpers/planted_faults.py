@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults that are planted into the truth of a scene, to count how often the diagnosis names them.
+"""Faults that are planted into the reference of a scene, to count how often the diagnosis names them.
 
-Where a fault is one of the scene, such as another extinction, the image is the certified truth of the changed scene
+Where a fault is one of the scene, such as another extinction, the image is the certified reference of the changed scene
 (`reference.quadrature`), by code that the hypotheses do not have: adaptive integrals in the place of fixed nodes. What
 was done to an image is done to that of the right scene.
 """
@@ -46,44 +46,46 @@ class Planted:
     make: Make | None = None  #: the image of a scene with the fault; None: the scene is right
     values: Callable[[Array], Array | None] | None = None  #: what is done to the image then
 
-    def image(self, truth: ReferenceScene) -> Array | None:
+    def image(self, reference: ReferenceScene) -> Array | None:
         """Return the image, (height, width, 3), or None where the scene cannot have the fault."""
-        image = right_image(truth) if self.make is None else self.make(truth)
+        image = right_image(reference) if self.make is None else self.make(reference)
         return image if image is None or self.values is None else self.values(image)
 
 
-def _quadrature(truth: ReferenceScene, **how: Any) -> ReferenceImage:
-    return quadrature_image(truth, checks=_CHECKS, plan=PointPlan(most=_POINTS), **how)
+def _quadrature(reference: ReferenceScene, **how: Any) -> ReferenceImage:
+    return quadrature_image(reference, checks=_CHECKS, plan=PointPlan(most=_POINTS), **how)
 
 
 def _total(image: ReferenceImage) -> Array:
     return reference_layer(image, _HOLDS, emitted=False)  # pixels that show a light take no part
 
 
-def right_image(truth: ReferenceScene) -> Array:
+def right_image(reference: ReferenceScene) -> Array:
     """Return the image of a scene without a fault, (height, width, 3)."""
-    return _total(_quadrature(truth))
+    return _total(_quadrature(reference))
 
 
 def _of_scene(change: Callable[[ReferenceScene], ReferenceScene | None]) -> Callable[[ReferenceScene], Array | None]:
-    def image(truth: ReferenceScene) -> Array | None:
-        changed = change(truth)
+    def image(reference: ReferenceScene) -> Array | None:
+        changed = change(reference)
         return None if changed is None else _total(_quadrature(_with_emitters(changed)))
 
     return image
 
 
-def _with_emitters(truth: ReferenceScene) -> ReferenceScene:
+def _with_emitters(reference: ReferenceScene) -> ReferenceScene:
     """Return a scene whose point and spot lights are Mitsuba's too: the light on surfaces is theirs."""
-    whole = truth.scene
-    near = iter(truth.lights)
+    whole = reference.scene
+    near = iter(reference.lights)
     emitters = [
         emitter if is_directional(emitter) else mi.load_dict(_emitter(next(near)))
         for emitter in whole.emitters()
         if not is_area(emitter)
     ]
     parts = [*whole.sensors(), *whole.shapes(), *emitters]
-    return replace(truth, scene=mi.load_dict({"type": "scene"} | {f"part{n}": part for n, part in enumerate(parts)}))
+    return replace(
+        reference, scene=mi.load_dict({"type": "scene"} | {f"part{n}": part for n, part in enumerate(parts)})
+    )
 
 
 def _emitter(light: ReferenceLight) -> dict[str, Any]:
@@ -98,8 +100,10 @@ def _emitter(light: ReferenceLight) -> dict[str, Any]:
     return {"type": "spot", "to_world": mi.ScalarTransform4f(matrix), "intensity": intensity, **angles}
 
 
-def _media(truth: ReferenceScene, change: Callable[[Any], Any]) -> ReferenceScene:
-    return replace(truth, medium=change(truth.medium), media=tuple(change(medium) for medium in truth.media))
+def _media(reference: ReferenceScene, change: Callable[[Any], Any]) -> ReferenceScene:
+    return replace(
+        reference, medium=change(reference.medium), media=tuple(change(medium) for medium in reference.media)
+    )
 
 
 def _optics(change: Callable[[Array, Array], tuple[Array, Array]]) -> Callable[[ReferenceScene], ReferenceScene]:
@@ -107,7 +111,7 @@ def _optics(change: Callable[[Array, Array], tuple[Array, Array]]) -> Callable[[
         sigma_t, albedo = change(medium.sigma_t, medium.albedo)
         return replace(medium, sigma_t=sigma_t, albedo=albedo)
 
-    return lambda truth: _media(truth, changed)
+    return lambda reference: _media(reference, changed)
 
 
 def _absorption(factor: float) -> Callable[[Array, Array], tuple[Array, Array]]:
@@ -122,18 +126,20 @@ def _absorption(factor: float) -> Callable[[Array, Array], tuple[Array, Array]]:
 def _scenery(
     wanted: Callable[[ReferenceScene], bool], **given: Any
 ) -> Callable[[ReferenceScene], ReferenceScene | None]:
-    return lambda truth: replace(truth, lights=Scenery(**given).lights(truth)) if wanted(truth) else None
+    return lambda reference: (
+        replace(reference, lights=Scenery(**given).lights(reference)) if wanted(reference) else None
+    )
 
 
-def _spots(truth: ReferenceScene) -> bool:
-    return any(light.axis is not None for light in truth.lights)
+def _spots(reference: ReferenceScene) -> bool:
+    return any(light.axis is not None for light in reference.lights)
 
 
-def _pixels(truth: ReferenceScene, change: Callable[[Array, tuple[int, int]], Array]) -> ReferenceScene:
+def _pixels(reference: ReferenceScene, change: Callable[[Array, tuple[int, int]], Array]) -> ReferenceScene:
     """Return a scene whose rays go through other places on the film."""
-    size = truth.width, truth.height
-    sensor = truth.scene.sensors()[0]
-    return replace(truth, direction=film_directions(sensor, change(pixel_centres(size), size), size))
+    size = reference.width, reference.height
+    sensor = reference.scene.sensors()[0]
+    return replace(reference, direction=film_directions(sensor, change(pixel_centres(size), size), size))
 
 
 def _other_axis(positions: Array, size: tuple[int, int]) -> Array:
@@ -141,28 +147,28 @@ def _other_axis(positions: Array, size: tuple[int, int]) -> Array:
     return middle + (size[0] / size[1]) * (positions - middle)
 
 
-def _darker_corners(truth: ReferenceScene) -> Array:
+def _darker_corners(reference: ReferenceScene) -> Array:
     """Return an image as a lens shows it: dimmed by the fourth power of the cosine, here 1/sqrt(1 + tan^2)."""
-    width, height = truth.width, truth.height
-    half = np.tan(0.5 * np.deg2rad(float(mi.traverse(truth.scene.sensors()[0])["x_fov"][0])))
+    width, height = reference.width, reference.height
+    half = np.tan(0.5 * np.deg2rad(float(mi.traverse(reference.scene.sensors()[0])["x_fov"][0])))
     column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     across, along = half * (2 * column / width - 1), half * (2 * row - height) / width
-    return right_image(truth) / (1 + across**2 + along**2)[..., None] ** 2
+    return right_image(reference) / (1 + across**2 + along**2)[..., None] ** 2
 
 
-def _near_lights(truth: ReferenceScene) -> bool:
-    return bool(truth.lights)
+def _near_lights(reference: ReferenceScene) -> bool:
+    return bool(reference.lights)
 
 
-def _in_feet(truth: ReferenceScene) -> ReferenceScene | None:
+def _in_feet(reference: ReferenceScene) -> ReferenceScene | None:
     """Return a scene whose lengths are 1/0.3048 times as long, brought back to size: lamps and media are not.
 
     Without lamps that is another extinction, and nothing else.
     """
-    if not truth.lights:
+    if not reference.lights:
         return None
-    lights = tuple(replace(light, intensity=light.intensity * _FOOT**2) for light in truth.lights)
-    return replace(_optics(lambda s, a: (s / _FOOT, a))(truth), lights=lights)
+    lights = tuple(replace(light, intensity=light.intensity * _FOOT**2) for light in reference.lights)
+    return replace(_optics(lambda s, a: (s / _FOOT, a))(reference), lights=lights)
 
 
 def _clamped(image: Array) -> Array | None:
@@ -183,12 +189,12 @@ PLANTED = (
     Planted("albedo", "the albedo twice", _of_scene(_optics(lambda s, a: (s, a * a)))),
     Planted("albedo", "the albedo left out", _of_scene(_optics(lambda s, a: (s, np.ones_like(a))))),
     Planted("sigma-s", "extinction for scattering", _of_scene(_optics(lambda s, a: (s / np.maximum(a, 1e-9), a)))),
-    Planted("g", "another g", _of_scene(lambda truth: _media(truth, lambda m: replace(m, phase=_LOBE)))),
+    Planted("g", "another g", _of_scene(lambda reference: _media(reference, lambda m: replace(m, phase=_LOBE)))),
     Planted("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
     Planted("spot-angle", "cones half as wide", _of_scene(_scenery(_spots, cone=0.5))),
     Planted("light-position", "the light moved", _of_scene(_scenery(_near_lights, moved=(0.07, -0.05, 0.09)))),
-    Planted("fov-axis", "the other field of view", _of_scene(lambda truth: _pixels(truth, _other_axis))),
-    Planted("shift", "half a pixel", _of_scene(lambda truth: _pixels(truth, lambda p, size: p - [0.5, 0.5]))),
+    Planted("fov-axis", "the other field of view", _of_scene(lambda reference: _pixels(reference, _other_axis))),
+    Planted("shift", "half a pixel", _of_scene(lambda reference: _pixels(reference, lambda p, size: p - [0.5, 0.5]))),
     Planted("flip", "upside down", values=lambda image: image[::-1]),
     Planted("flip", "mirrored", values=lambda image: image[:, ::-1]),
     Planted("transfer", "sRGB", values=to_srgb),

@@ -13,15 +13,15 @@ from reference.visibility.planes import cone_interval, rays_at
 from tests.helpers.scenes import tiny_scene
 
 
-def rays_of(truth, light=0):
+def rays_of(reference, light=0):
     """Return the rays of an image in their planes with a light, where they begin and end, and what is in the light."""
-    lamp = truth.lights[light]
-    rays = rays_at(truth.origin, truth.direction, lamp.position)
-    hits = surface_hits(truth)
-    distance = exact_distance(truth, hits.interaction, hits.distance)
+    lamp = reference.lights[light]
+    rays = rays_at(reference.origin, reference.direction, lamp.position)
+    hits = surface_hits(reference)
+    distance = exact_distance(reference, hits.interaction, hits.distance)
     low, high = cone_interval(rays, lamp, lamp.cutoff)
     ends = np.maximum(rays.distance(low), 0.0), np.minimum(rays.distance(high), distance)
-    return rays, ends, obstacles(truth, Ball(lamp.position), distance)
+    return rays, ends, obstacles(reference, Ball(lamp.position), distance)
 
 
 def box(centre, size, **changes):

@@ -7,7 +7,7 @@ this scene can reveal a fault in the formula for soft spots or in the sum over l
 
 `wide-lights`, in `WIDE_PROBES`, has lights with extent of each shape, black ones and one of material `null`, some in
 view, before casters. Plates before the disk hide the corners of a square around it, whose light would nearly be that of
-the disk. Its truth takes many points of each light, so it is tried with faults of such lights alone.
+the disk. Its reference takes many points of each light, so it is tried with faults of such lights alone.
 
 `sun` has a directional light on two bounded media, a box and a sphere of coloured fog, with occluders before them.
 """

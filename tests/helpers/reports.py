@@ -115,7 +115,7 @@ def agreement(
     finished: bool = True,
     **statistics: Any,
 ) -> dict[str, Any]:
-    """Return the comparison of the truth with an estimator."""
+    """Return the comparison of the reference with an estimator."""
     known = {
         "relative_bias": 1.7e-4,
         "relative_bias_ci": [0.0 if equivalent else -0.02, 0.001],
@@ -133,8 +133,8 @@ def agreement(
     return {"estimator": estimator, "layer": layer, "statistics": known | statistics} | run
 
 
-def truth(**changes: Any) -> dict[str, Any]:
-    """Return how exact the truth of a scene is."""
+def reference(**changes: Any) -> dict[str, Any]:
+    """Return how exact the reference of a scene is."""
     counts = dict.fromkeys(("transitions", "checked", "disagreements", "refined", "left"), 0)
     return {"mean": 1.0, "relative_bound": 1e-10, "missed": 0.0} | counts | changes
 
@@ -155,7 +155,7 @@ def scene(name: str, methods: list[dict[str, Any]], **changes: Any) -> dict[str,
         "timed": [320, 240],
         "plan": {"shadows": "visibility tests", "medium": "unbounded", "lights": "1 point", "extinction": "one"},
         "notes": [],
-        "reference": truth(),
+        "reference": reference(),
         "exposure": 1.0,
         "agreement": {"volpath airlight": agreement()},
         "multiple": {"medium": share(0.123), "everything": share(0.21), "max_depth": 64, "batches": 4, "samples": 1},
@@ -215,7 +215,7 @@ def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
         "measured": {"first": WHEN, "last": WHEN},
         "settings": settings(),
         "environment": environment(),
-        "claims": [{"kind": "reference", "text": "The truth is confirmed by volpath.", "good": True}],
+        "claims": [{"kind": "reference", "text": "The reference is confirmed by volpath.", "good": True}],
         "scenes": scenes,
         "stability": [],
     } | changes
@@ -265,7 +265,7 @@ def report(seed: int | None = None, *, busy: float = 0.0, machine: float = 1.0) 
             )
             for place, label in enumerate(LABELS)
         ]
-        scenes.append(scene(name, methods, reference=truth(mean=0.127 + number)))
+        scenes.append(scene(name, methods, reference=reference(mean=0.127 + number)))
     return report_of(copy.deepcopy(scenes), stability=[stable("exact")])
 
 

@@ -55,11 +55,11 @@ def ball_over_floor() -> dict[str, Any]:
 CHORDS = {"brick": airlight_sum.box(*BRICK), "pearl": airlight_sum.ball(*PEARL)}
 
 
-def plain_airlight(truth, pixel: int, **how: Any):
+def plain_airlight(reference, pixel: int, **how: Any):
     """Return the airlight along a pixel's ray from the only light of a scene with brick and pearl, by a plain sum."""
-    if truth.lights:
-        light = airlight_sum.Light(truth.lights[0].position, 1.0, truth.lights[0].intensity)
+    if reference.lights:
+        light = airlight_sum.Light(reference.lights[0].position, 1.0, reference.lights[0].intensity)
     else:
-        light = airlight_sum.Light(-truth.directional[0].direction, 0.0, truth.directional[0].irradiance)
-    bodies, around = airlight_sum.bodies_of(truth, CHORDS)
-    return airlight_sum.airlight_sum(truth.origin, truth.direction[pixel], light, bodies, around=around, **how)
+        light = airlight_sum.Light(-reference.directional[0].direction, 0.0, reference.directional[0].irradiance)
+    bodies, around = airlight_sum.bodies_of(reference, CHORDS)
+    return airlight_sum.airlight_sum(reference.origin, reference.direction[pixel], light, bodies, around=around, **how)

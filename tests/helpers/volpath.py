@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Mitsuba's path tracer says of a truth, for the tests that ask it."""
+"""What Mitsuba's path tracer says of a reference, for the tests that ask it."""
 
 import numpy as np
 
@@ -9,15 +9,15 @@ from reference.quadrature.image import quadrature_image
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 
 
-def assert_volpath_agrees(truth, *, batches, least_precision):
+def assert_volpath_agrees(reference, *, batches, least_precision):
     """Trace batches of 256 samples a pixel: the pooled bias of each layer and channel is within four standard errors.
 
     The standard errors are below `least_precision`, relative; the shadow-ray epsilon is corrected.
     """
-    expected = quadrature_image(truth, shadow_scale=1 - measure_shadow_epsilon())
-    traced = volpath_batch(truth, 100, 256)
+    expected = quadrature_image(reference, shadow_scale=1 - measure_shadow_epsilon())
+    traced = volpath_batch(reference, 100, 256)
     for seed in range(101, 100 + batches):
-        traced = merged(traced, volpath_batch(truth, seed, 256))
+        traced = merged(traced, volpath_batch(reference, seed, 256))
     for number, image in enumerate((expected.airlight, expected.surface)):
         for channel in range(3):
             total = image[..., channel].sum()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Droplets on the side under test are those of the truth, which computes them by another route."""
+"""Droplets on the side under test are those of the reference, which computes them by another route."""
 
 import numpy as np
 import pytest
@@ -21,13 +21,13 @@ def test_coefficients_by_phase_shifts_are_those_by_complex_recurrences():
 @pytest.mark.parametrize("droplets", [pytest.param(Droplets(), marks=pytest.mark.slow), Droplets(2.0, 8.0)])
 def test_two_routes_give_one_phase_function(droplets):
     series = droplet_series(droplets.effective_radius, droplets.gamma)
-    truth = optics(droplets)
+    reference = optics(droplets)
     angle = np.concatenate([np.linspace(0, np.pi, 901), np.geomspace(1e-5, 0.1, 50)])
-    assert series.values(angle) == pytest.approx(truth.series(np.cos(angle)), rel=1e-7)
-    assert series.efficiency == pytest.approx(truth.q_extinction, rel=1e-10)
-    assert series.extinction_per_droplet * 1e-12 * droplets.number == pytest.approx(truth.extinction, rel=1e-10)
-    assert series.share_below(np.deg2rad(5)) == pytest.approx(truth.share(0, 5), abs=1e-9)
-    assert share_cut(droplets.effective_radius, droplets.gamma) == pytest.approx(Modified(truth).removed, abs=1e-9)
+    assert series.values(angle) == pytest.approx(reference.series(np.cos(angle)), rel=1e-7)
+    assert series.efficiency == pytest.approx(reference.q_extinction, rel=1e-10)
+    assert series.extinction_per_droplet * 1e-12 * droplets.number == pytest.approx(reference.extinction, rel=1e-10)
+    assert series.share_below(np.deg2rad(5)) == pytest.approx(reference.share(0, 5), abs=1e-9)
+    assert share_cut(droplets.effective_radius, droplets.gamma) == pytest.approx(Modified(reference).removed, abs=1e-9)
 
 
 def test_the_table_is_the_series():

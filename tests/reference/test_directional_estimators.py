@@ -22,11 +22,11 @@ HG = {"phase": {"type": "hg", "g": 0.6}}
 
 def traced(scene, batches, samples=64):
     """Return quadrature image and batches of single-scatter."""
-    truth = read_reference(mi.load_dict(scene))
-    done = single_scatter_batch(truth, 0, samples)
+    reference = read_reference(mi.load_dict(scene))
+    done = single_scatter_batch(reference, 0, samples)
     for seed in range(1, batches):
-        done = merged(done, single_scatter_batch(truth, seed, samples))
-    return quadrature_image(truth), done
+        done = merged(done, single_scatter_batch(reference, seed, samples))
+    return quadrature_image(reference), done
 
 
 def caster():

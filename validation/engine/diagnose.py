@@ -171,7 +171,7 @@ def diagnose_image(
             f"{path}: {count} pixels of the layer '{judged.name}' say something; wanted at least {_FEWEST}, finite and "
             "not of a light itself: fewer do not tell a fault from noise"
         )
-    light = light or SceneLight(seen.truth)
+    light = light or SceneLight(seen.reference)
     shape = judged.size[1], judged.size[0]
 
     def begun(kind: str) -> _Attempt:
@@ -210,11 +210,11 @@ class _Attempt:
     """The search among all faults, with pixels of one kind."""
 
     def __init__(self, predictor: Predictor, pixel: str, progress: Progress | None) -> None:
-        shapes = predictor.truth.occluders.shapes()
+        shapes = predictor.reference.occluders.shapes()
         self.many = sum(shape.primitive_count() for shape in shapes) >= _MANY_TRIANGLES
         self.predictor = predictor.coarse if self.many else predictor
         self.pixel, self.progress = pixel, progress
-        self.little = no_fault(predictor.truth)
+        self.little = no_fault(predictor.reference)
         self.right = explain(self.predictor, ())
         self.faults = faults_of(self.predictor)
         self.singles: list[Explanation] = []
@@ -286,7 +286,7 @@ class _Attempt:
         pairs = self.predictor.pairs
         if len(explanation.faults) > 1:
             return leaves_nothing(explanation, self.pixel)
-        if explanation.faults and not self.predictor.truth.area:
+        if explanation.faults and not self.predictor.reference.area:
             # What is little for an image may be much beside what the fault itself does, if it is not the right one:
             # a factor leaves 0.4 % of what a lamp of 0.25 m does, all of it in the shadows, and another g 0.2 % of a
             # near plane at 0.1 m, most of it in the middle.

@@ -96,17 +96,17 @@ def at_edges(values: Array) -> Bools:
 
 def place_words(predictor: Predictor, explanation: Explanation) -> str:
     """Say where the error lies that an explanation leaves, such as 'at the edges of shapes'."""
-    truth, (height, width) = predictor.truth, predictor.shape
+    reference, (height, width) = predictor.reference, predictor.shape
     errors = explanation.errors.mean(axis=1)
     size = np.abs(explanation.errors).mean(axis=1)
     row, column = np.divmod(predictor.pixels, width)
     regions: list[tuple[str, Bools]] = []
-    for words, angle in _angles(truth):
+    for words, angle in _angles(reference):
         pixel = angle.reshape(height, width)
         step = float(np.median(np.abs(np.diff(pixel, axis=1)))) or math.inf
         regions.append((f"beside {words}", (angle < 2 * _BESIDE * step)[predictor.pixels]))
     # One over the depth is linear in the image of a plane: what bends it is an outline.
-    depth = surface_hits(truth).distance * (truth.direction @ predictor.view.axis)
+    depth = surface_hits(reference).distance * (reference.direction @ predictor.view.axis)
     inverse = (1 / depth).reshape(height, width)
     outline = np.abs(laplace(inverse, mode="nearest")) > _BENT * inverse.max()
     wide = binary_dilation(outline, iterations=max(1, min(_WIDE, min(height, width) // 12) - 1))
@@ -117,7 +117,7 @@ def place_words(predictor: Predictor, explanation: Explanation) -> str:
     found = [words for words, here in regions if _lies(size, here) or _lies(amount, here)]
     if found:
         return " and ".join(found)
-    for words, angle in _angles(truth):
+    for words, angle in _angles(reference):
         if _is_ringed(errors, angle[predictor.pixels]):
             return f"in rings around {words}"
     corner = np.hypot(column + 0.5 - 0.5 * width, row + 0.5 - 0.5 * height) > 0.4 * math.hypot(width, height)
@@ -140,13 +140,13 @@ def _lies(size: Array, here: Bools) -> bool:
     return inside > _MORE * outside and (share > _SHARE or (inside > 4 * outside and share > 0.05))
 
 
-def _angles(truth: ReferenceScene) -> list[tuple[str, Array]]:
+def _angles(reference: ReferenceScene) -> list[tuple[str, Array]]:
     """Return the angle of every pixel to each light before the camera, (pixels,) [rad], and what it is called."""
-    places = [light.position for light in truth.lights] + [light.centre for light in truth.area]
+    places = [light.position for light in reference.lights] + [light.centre for light in reference.area]
     found = []
     for place in places:
-        way = (place - truth.origin) / max(float(np.linalg.norm(place - truth.origin)), 1e-300)
-        cosine = truth.direction @ way
+        way = (place - reference.origin) / max(float(np.linalg.norm(place - reference.origin)), 1e-300)
+        cosine = reference.direction @ way
         if cosine.max() > 0.9:
             found.append(("the light" if len(places) == 1 else "a light", np.arccos(np.clip(cosine, -1, 1))))
     return found

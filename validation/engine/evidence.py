@@ -37,9 +37,9 @@ _WORST = 0.02  # share of the pixels that may be as wrong as they like
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
 
 
-def no_fault(truth: ReferenceScene) -> float:
+def no_fault(reference: ReferenceScene) -> float:
     """Return the mean relative error that is no fault in a scene [1]."""
-    return _LEFT_OF_AREA if truth.area else _LEFT
+    return _LEFT_OF_AREA if reference.area else _LEFT
 
 
 def scale_of(explanation: Explanation, pixel: str) -> float:

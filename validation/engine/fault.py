@@ -141,17 +141,17 @@ def short(value: float, digits: int = 4) -> float:
 
 def traits(predictor: Predictor) -> dict[str, bool]:
     """Return whether a scene and its image have what faults need, by the words of `Fault.needs`."""
-    truth, fog, holds, values = predictor.truth, predictor.fog, predictor.seen.holds, predictor.seen.values
-    spots, right = [light for light in truth.lights if light.axis is not None], Guess(fog)
-    shapes, lobes = bool(truth.occluders.shapes()), any(isinstance(g, float) for g in fog.phase)
+    reference, fog, holds, values = predictor.reference, predictor.fog, predictor.seen.holds, predictor.seen.values
+    spots, right = [light for light in reference.lights if light.axis is not None], Guess(fog)
+    shapes, lobes = bool(reference.occluders.shapes()), any(isinstance(g, float) for g in fog.phase)
     optics = [pair for media in zip(fog.sigma_t, fog.albedo, strict=True) for pair in zip(*media, strict=True)]
     return {
         "shapes": shapes,
-        "lamps": bool(truth.lights),  # point and spot lights
-        "point lights": len(spots) < len(truth.lights),
+        "lamps": bool(reference.lights),  # point and spot lights
+        "point lights": len(spots) < len(reference.lights),
         "spots": bool(spots),
         "soft spots": any(0 < light.beam < light.cutoff for light in spots),
-        "no bounds": not truth.media,
+        "no bounds": not reference.media,
         "height fog": fog.height is not None,
         "even fog": fog.height is None,
         "fog": holds != "surface",  # in the image
@@ -160,7 +160,7 @@ def traits(predictor: Predictor) -> dict[str, bool]:
         "absorption": any(s > 0 and a < 1 - 1e-6 for s, a in optics),
         "lobes": lobes and holds != "surface",  # of Henyey and Greenstein
         "g": lobes and holds != "surface" and any(fog.phase),  # other than 0
-        "isotropy": not lobes and any(medium.phase.is_constant for medium in (truth.medium, *truth.media)),
+        "isotropy": not lobes and any(medium.phase.is_constant for medium in (reference.medium, *reference.media)),
         "square": predictor.shape[0] == predictor.shape[1],
         "oblong": predictor.shape[0] != predictor.shape[1],
         "colours": bool(np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values))),

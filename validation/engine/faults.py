@@ -31,8 +31,8 @@ FAULTS = tuple(replace(fault, kind=kind) for kind, table in _TABLES.items() for 
 
 def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
     """Return the faults that an image of a scene may have, those of its single lights and classes of lights too."""
-    sources = light_sources(predictor.truth)
-    near, far = len(predictor.truth.lights), len(predictor.truth.lights) + len(predictor.truth.directional)
+    sources = light_sources(predictor.reference)
+    near, far = len(predictor.reference.lights), len(predictor.reference.lights) + len(predictor.reference.directional)
     classes = {
         "point and spot lights": range(near),
         "directional lights": range(near, far),

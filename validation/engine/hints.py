@@ -61,10 +61,10 @@ def find_hints(reference: ArrayLike, test: ArrayLike) -> Hints:
         return Hints(math.nan, math.nan, (), tst, "the image has no finite value")
     mean = float(np.nanmean(ref)) if not np.isnan(ref).all() else 0.0
     if mean <= 0:
-        return Hints(math.nan, math.nan, (), tst, "the truth is black")
+        return Hints(math.nan, math.nan, (), tst, "the reference is black")
     factor = _fitted(ref, tst)
     if math.isnan(factor):
-        dark = "wherever the truth is lit" if np.any(np.nan_to_num(tst)) else "everywhere"
+        dark = "wherever the reference is lit" if np.any(np.nan_to_num(tst)) else "everywhere"
         return Hints(math.nan, math.nan, (), tst, f"the image is black {dark}")
     corrected, words = _suspects(ref, tst, mean)
     return Hints(factor, _rmse(ref, factor * tst) / mean, (*words, *_clipped(ref, tst)), corrected)
@@ -147,6 +147,6 @@ def _clipped(ref: Array, tst: Array) -> tuple[str, ...]:
     if count < 8 or top <= 0 or not (ref[stopped] > 1.02 * top).mean() > 0.5:
         return ()
     return (
-        f"{count} values stop at {top:.4g} where the truth goes up to {np.nanmax(ref[stopped]):.4g}: write floats, "
+        f"{count} values stop at {top:.4g} where the reference goes up to {np.nanmax(ref[stopped]):.4g}: write floats, "
         "without a tone curve",
     )

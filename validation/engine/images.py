@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images that another renderer wrote, a game engine for instance: EXR files named by scene, judged against the truth.
+"""Images that another renderer wrote, such as a game engine: EXR files named by scene, judged by the reference.
 
 A folder holds SCENE.exr, or SCENE.NAME.exr where several images of a scene are to be told apart. An image with a layer
 `airlight` is judged by that; else its plain channels are judged against airlight plus surface. It is judged at its own
-size, which all images of a scene must share, and by the truth that fits, at pixel centres or over their areas.
+size, which all images of a scene must share, and by the reference that fits, at pixel centres or over their areas.
 """
 
 import difflib
@@ -86,7 +86,7 @@ def measure_image(
         layers[SURFACE] = image.layers[SURFACE]
     judged = judge_image(image, layer, loaded, reference_of, path=shown.path, mask=image.with_data())
     both = surfaces and AIRLIGHT in layers and SURFACE in layers
-    return judged, layers, error_metrics(judged.fit.truth.surface, layers[SURFACE]) if both else None
+    return judged, layers, error_metrics(judged.fit.reference.surface, layers[SURFACE]) if both else None
 
 
 def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:

@@ -86,10 +86,10 @@ class Verdict:
 
 @dataclass(frozen=True)
 class PixelFit:
-    """The truth that an image is judged by."""
+    """The reference that an image is judged by."""
 
     pixel: str  #: 'centre' or 'area'
-    truth: ReferenceImage
+    reference: ReferenceImage
     hints: Hints
     centre_error: float | None  #: where the two references differ; None where they were not compared
     area_error: float | None
@@ -109,20 +109,22 @@ class PixelFit:
 
 @dataclass(frozen=True)
 class EngineComparison:
-    """How far an image from elsewhere is from the truth of a scene."""
+    """How far an image from elsewhere is from the reference of a scene."""
 
     scene: str
     path: str
     size: tuple[int, int]  #: width and height [pixels]
-    fit: PixelFit  #: what a pixel of the truth is, and what is wrong with the image as a whole
+    fit: PixelFit  #: what a pixel of the reference is, and what is wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
-    reference_error: float  #: bound of the error of the truth's airlight, with its standard error, relative to its mean
+    reference_error: (
+        float  #: bound of the error of the reference's airlight, with its standard error, relative to its mean
+    )
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
     verdict: Verdict
     note: str  #: what the reader of the file changed or left out
     margin: float | None  #: largest relative bias that counts as agreement
-    truth: NDArray[np.floating] = field(repr=False, compare=False)  #: what the image was compared with
+    reference: NDArray[np.floating] = field(repr=False, compare=False)  #: what the image was compared with
     image: NDArray[np.floating] = field(repr=False, compare=False)  #: the layer that was judged
 
     @property
@@ -132,7 +134,7 @@ class EngineComparison:
 
     @property
     def pixel(self) -> str:
-        """What a pixel of the truth is: its 'centre' or its 'area'."""
+        """What a pixel of the reference is: its 'centre' or its 'area'."""
         return self.fit.pixel
 
     @property
@@ -174,8 +176,8 @@ class EngineComparison:
         of = "airlight + surface" if self.expected == TOTAL else self.expected
         pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
         lines = [
-            f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; truth: {of}, {pixel}, airlight known to "
-            f"{self.reference_error:.2g} of its mean",
+            f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; reference: {of}, {pixel}, airlight "
+            f"known to {self.reference_error:.2g} of its mean",
             f"pixels           {self.fit.words}",
             self.comparison.summary(),
         ]
@@ -202,7 +204,7 @@ def compare_scene(
     all_metrics: bool = False,
     progress: Progress | None = None,
 ) -> EngineComparison:
-    """Compare an EXR file with the truth of a scene at the file's size.
+    """Compare an EXR file with the reference of a scene at the file's size.
 
     `scene`: a built-in scene or a Mitsuba XML file; `layer`, `holds`: the layer to judge and what it holds, see
     `validation.engine.judged_layer.judged_layer`; `pixel`: 'centre' or 'area', see
@@ -256,9 +258,9 @@ def judge_image(
     fit = replace(fit, hints=replace(fit.hints, words=(*fit.hints.words, *other)))
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
     layers = {name: image.layers[name]} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
-    wanted = expected_layer(fit.truth, judged)
+    wanted = expected_layer(fit.reference, judged)
     expected = {name: wanted}
-    own_error = reference_error(fit.truth, judged.holds)
+    own_error = reference_error(fit.reference, judged.holds)
     if with_errors and own_error is not None:
         # Where no path of the image arrived it has no standard error: the reference alone must not judge such a value.
         expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
@@ -277,35 +279,37 @@ def judge_image(
         size=judged.size,
         fit=fit,
         expected=judged.holds,
-        reference_error=relative_bound(fit.truth),
+        reference_error=relative_bound(fit.reference),
         comparison=comparison,
-        place=error_place(wanted, test, lamp_distance(loaded, fit.truth)),
+        place=error_place(wanted, test, lamp_distance(loaded, fit.reference)),
         verdict=judge(wanted, test, fit.hints, comparison.failures),
         note=str(image.attributes.get(NOTE, "")),
         margin=margin,
-        truth=wanted,
+        reference=wanted,
         image=image.layers[name],
     )
 
 
 def references(loaded: LoadedScene, progress: Progress | None = None) -> Callable[[str], ReferenceImage]:
-    """Return a function that computes the truth at pixel centres or over their areas, or takes it from the cache."""
+    """Return a function that computes the reference at pixel centres or over their areas, or reads the cache."""
     tell = None if progress is None else lambda done, total, what: progress(done / total, what)
     return cache(lambda pixel: reference_image(loaded.scene, pixel=pixel, progress=tell))
 
 
-def relative_bound(truth: ReferenceImage) -> float:
+def relative_bound(reference: ReferenceImage) -> float:
     """Return how well the airlight is known relative to its mean, where both are finite: its bound + standard error."""
-    error = truth.airlight_bound if truth.airlight_se is None else truth.airlight_bound + truth.airlight_se
-    finite = np.isfinite(truth.airlight) & np.isfinite(error)
-    mean = float(truth.airlight[finite].mean()) if finite.any() else 0.0
+    error = (
+        reference.airlight_bound if reference.airlight_se is None else reference.airlight_bound + reference.airlight_se
+    )
+    finite = np.isfinite(reference.airlight) & np.isfinite(error)
+    mean = float(reference.airlight[finite].mean()) if finite.any() else 0.0
     return float(error[finite].mean()) / mean if mean > 0 else 0.0
 
 
-def lamp_distance(loaded: LoadedScene, truth: ReferenceImage) -> NDArray[np.float64]:
+def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> NDArray[np.float64]:
     """Return how far the nearest lamp is from each pixel, (height, width) [pixels in the middle of the image]."""
     angle = pixel_angle(read_reference(loaded.scene))  # zero in an image of one column
-    return truth.light_angle / angle if angle > 0 else np.full(truth.light_angle.shape, math.inf)
+    return reference.light_angle / angle if angle > 0 else np.full(reference.light_angle.shape, math.inf)
 
 
 def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[str, ...]:
@@ -313,13 +317,16 @@ def _other_light(judged: JudgedLayer, fitting: list[ReferenceImage]) -> tuple[st
     errors, powers = {}, {}
     if judged.holds == TOTAL and judged.emitted and fitting[0].emitted is not None:
         shown, hidden = (
-            min(_mean_square(judged.values - reference_layer(truth, TOTAL, emitted=emitted)) for truth in fitting)
+            min(
+                _mean_square(judged.values - reference_layer(reference, TOTAL, emitted=emitted))
+                for reference in fitting
+            )
             for emitted in (True, False)
         )
         if GAIN**2 * hidden < shown:
             return ("the image does not show the area lights that the camera sees: compare its airlight",)
     for name in KINDS:
-        layers = [reference_layer(truth, name, emitted=judged.emitted) for truth in fitting]
+        layers = [reference_layer(reference, name, emitted=judged.emitted) for reference in fitting]
         errors[name] = min(_mean_square(judged.values - values) for values in layers)
         powers[name] = _mean_square(layers[0])
     nearest = min(errors, key=errors.__getitem__)
@@ -338,14 +345,14 @@ def _mean_square(values: NDArray[np.floating]) -> float:
 
 
 def fit_pixel(image: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]) -> PixelFit:
-    """Return the truth that fits an image.
+    """Return the reference that fits an image.
 
-    `reference_of`: computes a truth; asked for the means only if the image does not fit the centres to `_EXACT`;
+    `reference_of`: computes a reference; asked for the means only if the image does not fit the centres to `_EXACT`;
     `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
     """
     if len(kinds) == 1:
-        truth = reference_of(kinds[0])
-        return PixelFit(kinds[0], truth, find_hints(expected_layer(truth, image), image.values), None, None)
+        reference = reference_of(kinds[0])
+        return PixelFit(kinds[0], reference, find_hints(expected_layer(reference, image), image.values), None, None)
     at_centre = reference_of("centre")
     centre = expected_layer(at_centre, image)
     hints = find_hints(centre, image.values)
@@ -361,34 +368,34 @@ def fit_pixel(image: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str
     return PixelFit("centre", at_centre, hints, *errors)
 
 
-def _fits(truth: Array, image: Array) -> bool:
-    finite = np.isfinite(truth)
-    difference = (image - truth)[finite]
-    power = float(np.mean(truth[finite] ** 2)) if finite.any() else 0.0
+def _fits(reference: Array, image: Array) -> bool:
+    finite = np.isfinite(reference)
+    difference = (image - reference)[finite]
+    power = float(np.mean(reference[finite] ** 2)) if finite.any() else 0.0
     return bool(np.isfinite(difference).all() and np.mean(difference**2) <= _EXACT**2 * power)
 
 
-def _error(truth: Array, image: Array, where: NDArray[np.bool_]) -> float:
-    """Return the error over some values; an infinite truth is wrong by all of it."""
-    finite = np.isfinite(truth)
-    floor = FLOOR * float(truth[finite].mean()) if finite.any() else 0.0
+def _error(reference: Array, image: Array, where: NDArray[np.bool_]) -> float:
+    """Return the error over some values; an infinite reference is wrong by all of it."""
+    finite = np.isfinite(reference)
+    floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
     chosen = where & np.isfinite(image)
     if not chosen.any():
         return 0.0
-    wanted, got = truth[chosen], image[chosen]
+    wanted, got = reference[chosen], image[chosen]
     with np.errstate(invalid="ignore", divide="ignore"):
         relative = np.abs(got - wanted) / np.maximum(wanted, floor)
     return float(np.mean(np.minimum(np.nan_to_num(relative, nan=1.0), 1.0)))
 
 
-def judge(truth: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:
+def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:
     """Decide whether an image is right.
 
-    `truth`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `hints`: what is suspected of the image as a whole;
+    `reference`, `image`: radiance, (height, width, 3) [W/(m^2 sr)]; `hints`: what is suspected of the image as a whole;
     `failures`: why it must be called wrong anyway: values that are not finite, or negative.
     """
-    side = min(BLOCK, max(1, min(truth.shape[:2]) // 10))
-    error, noise = _block_errors(truth, image, side)
+    side = min(BLOCK, max(1, min(reference.shape[:2]) // 10))
+    error, noise = _block_errors(reference, image, side)
     reasons = [*failures, *hints.words, *([hints.reason] if hints.reason else [])]
     if not reasons and abs(hints.factor - 1) > RIGHT:
         reasons.append(f"the best factor is {hints.factor:.4g}")
@@ -401,10 +408,10 @@ def judge(truth: Array, image: Array, hints: Hints, failures: Sequence[str]) -> 
     return Verdict(tuple(reasons), side, error, noise)
 
 
-def _block_errors(truth: Array, image: Array, side: int) -> tuple[float, float]:
+def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:
     """Return the relative error of the means of lit blocks, and the share of it that noise explains."""
-    finite = np.isfinite(truth) & np.isfinite(image)
-    wanted, got = np.where(finite, truth, 0.0), np.where(finite, image, 0.0)
+    finite = np.isfinite(reference) & np.isfinite(image)
+    wanted, got = np.where(finite, reference, 0.0), np.where(finite, image, 0.0)
     difference = got - wanted
     count, light, seen, offset, square = (
         block_sums(values, side) for values in (finite.astype(float), wanted, got, difference, difference**2)

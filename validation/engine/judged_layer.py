@@ -52,9 +52,9 @@ def judged_layer(
     return JudgedLayer(chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted)
 
 
-def expected_layer(truth: ReferenceImage, judged: JudgedLayer) -> NDArray[np.float64]:
+def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> NDArray[np.float64]:
     """Return what a layer should be, (height, width, 3) [W/(m^2 sr)]."""
-    return reference_layer(truth, judged.holds, emitted=judged.emitted)
+    return reference_layer(reference, judged.holds, emitted=judged.emitted)
 
 
 def _usual(image: Image, path: str | os.PathLike[str]) -> str:

@@ -47,7 +47,7 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
 
     The edge of a spot's cone moves more of the fog than all else: there nothing is held.
     """
-    if predictor.truth.lights[0].axis is not None:
+    if predictor.reference.lights[0].axis is not None:
         return at_position(predictor, guess, p)
     held = at_position(predictor, guess, at)
     x, y, z = (value - before for value, before in zip(p, held.scenery.moved, strict=True))

@@ -85,7 +85,7 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
     Irradiance and radiance, of lights that are far or have extent, are what they were.
     """
-    near = len(predictor.truth.lights)
+    near = len(predictor.reference.lights)
     intensity = tuple(value / p[0] ** 2 if light < near else value for light, value in enumerate(guess.fog.intensity))
     fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[0], albedo))
     return replace(guess, fog=replace(fog, intensity=intensity))
@@ -105,15 +105,15 @@ def _depths(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     """Return distances at which a fog may end: parts of those that the image shows."""
     view = predictor.view
     seen = view.distance[np.isfinite(view.distance)]
-    lights = [float(np.linalg.norm(light.position - view.truth.origin)) for light in view.truth.lights]
+    lights = [float(np.linalg.norm(light.position - view.reference.origin)) for light in view.reference.lights]
     far = float(np.quantile(seen, 0.9)) if seen.size else 2 * max(lights, default=5.0)
     return [(far * part,) for part in (0.9, 0.6, 0.35)]
 
 
 def _falling(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     """Return homogeneous fog with a density that falls with height, from the camera's on."""
-    up = _up(predictor.truth)
-    height = HeightFog((Layer(1.0, float(predictor.truth.origin @ up), p[0]),))
+    up = _up(predictor.reference)
+    height = HeightFog((Layer(1.0, float(predictor.reference.origin @ up), p[0]),))
     fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[1], albedo))
     return replace(guess, fog=replace(fog, height=height, up=up))
 
@@ -125,7 +125,10 @@ def _even(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 def _densities(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     """Return extinctions that height fog has at the camera and at lights, and fractions of them."""
-    fog, places = guess.fog.height, [predictor.truth.origin, *(light.position for light in predictor.truth.lights)]
+    fog, places = (
+        guess.fog.height,
+        [predictor.reference.origin, *(light.position for light in predictor.reference.lights)],
+    )
     assert fog is not None
     mean = float(np.mean(fog.density([place @ guess.fog.up for place in places])))
     return [(max(mean, 1e-3) * part,) for part in (1.0, 0.3, 3.0)]
@@ -147,9 +150,9 @@ def _stretched(factor: Callable[..., float]) -> Change:
     return _layers(lambda layer, *p: replace(layer, scale_height=factor(layer.scale_height, *p)))
 
 
-def _up(truth: ReferenceScene) -> Colour:
+def _up(reference: ReferenceScene) -> Colour:
     """Return the axis of the scene that is nearest to the camera's own way up."""
-    up = camera_matrix(truth.scene.sensors()[0])[:3, 1]
+    up = camera_matrix(reference.scene.sensors()[0])[:3, 1]
     axis = int(np.argmax(np.abs(up)))
     return colour(np.sign(up[axis]) * np.eye(3)[axis])
 

@@ -53,10 +53,10 @@ class Scenery:
         """What decides the rays."""
         return {"offset": self.offset, "zoom": self.zoom}
 
-    def lights(self, truth: ReferenceScene) -> tuple[ReferenceLight, ...]:
+    def lights(self, reference: ReferenceScene) -> tuple[ReferenceLight, ...]:
         """Return the point and spot lights of a scene as this scenery has them."""
         lights = []
-        for number, light in enumerate(truth.lights):
+        for number, light in enumerate(reference.lights):
             if number == 0 and any(self.moved):
                 light = replace(light, position=light.position + np.array(self.moved))
             if light.axis is not None and self.cone != 1:
@@ -73,10 +73,10 @@ class Scenery:
         if self.near > 0 or np.isfinite(self.far):
             ends = view.ends((self.near, self.far), self.spherical)
         if self.planar:
-            ends = np.zeros_like(view.distance), view.distance * (view.truth.direction @ view.axis)
+            ends = np.zeros_like(view.distance), view.distance * (view.reference.direction @ view.axis)
         return seen.model(
             view,
-            self.lights(seen.truth),
+            self.lights(seen.reference),
             ends=ends,
             shadows=self.shadows,
             radius=self.radius,
@@ -104,7 +104,7 @@ class Guess:
 class SceneLight:
     """The light of a scene, which all images of it share: paths by scenery, radiance by fog."""
 
-    truth: ReferenceScene
+    reference: ReferenceScene
     most: int = 12_000_000  #: numbers that are kept, those used last: some eight bytes each
     _kept: dict[Any, tuple[Any, int]] = field(default_factory=dict)  # with their sizes; the one used last comes last
 
@@ -114,16 +114,16 @@ class SceneLight:
 
         None where an image is so large that this would take minutes.
         """
-        truth = self.truth
-        if truth.width * truth.height > 1 << 17:
+        reference = self.reference
+        if reference.width * reference.height > 1 << 17:
             return None
         parts = []
         for seed in range(_BATCHES):
-            whole, single = (volpath_batch(truth, seed, _PATHS, max_depth=depth).mean for depth in (64, 2))
+            whole, single = (volpath_batch(reference, seed, _PATHS, max_depth=depth).mean for depth in (64, 2))
             parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
-        image = np.mean(parts, axis=0).reshape(2, truth.height, truth.width, 3)
+        image = np.mean(parts, axis=0).reshape(2, reference.height, reference.width, 3)
         # It is smooth but for edges, and noisy.
-        width = truth.width / _SMOOTH
+        width = reference.width / _SMOOTH
         return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))
 
     def view(self, seen: Seen, scenery: Scenery) -> View:
@@ -173,14 +173,14 @@ class Predictor:
     light: SceneLight
 
     @property
-    def truth(self) -> ReferenceScene:
+    def reference(self) -> ReferenceScene:
         """The scene."""
-        return self.seen.truth
+        return self.seen.reference
 
     @property
     def fog(self) -> Fog:
         """The fog as the scene has it."""
-        return scene_fog(self.seen.truth)
+        return scene_fog(self.seen.reference)
 
     @cached_property
     def coarse(self) -> "Predictor":
@@ -237,7 +237,7 @@ class Predictor:
     @cached_property
     def cosines(self) -> Array:
         """The cosines of the pixels to the axis of the camera, (m,)."""
-        return np.asarray(self.truth.direction[self.pixels] @ self.view.axis)
+        return np.asarray(self.reference.direction[self.pixels] @ self.view.axis)
 
     def shown(self, guess: Guess) -> Array:
         """Return the values of the image in these pixels, (m, 3), with the fault of the grid taken back."""

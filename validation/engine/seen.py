@@ -42,7 +42,7 @@ _TRIED = 48  # pixels that say how many samples a light needs
 class Seen:
     """An image and what is known of it."""
 
-    truth: ReferenceScene
+    reference: ReferenceScene
     values: Array  #: (pixels, 3), all pixels of the image, row by row [W/(m^2 sr)]
     holds: str  #: 'airlight', 'surface' or 'total'
     used: Bools  #: which pixels may take part, (pixels,)
@@ -64,7 +64,7 @@ class Seen:
             pixels = np.unique(pixels[np.minimum(places.astype(np.int64), len(pixels) - 1)])
             if apart:
                 pixels = self._with_partners(pixels[::2], apart)
-        return view_of(self.truth, pixels, rays_per_side=_SIDE if self.area else 0, offset=offset, zoom=zoom)
+        return view_of(self.reference, pixels, rays_per_side=_SIDE if self.area else 0, offset=offset, zoom=zoom)
 
     def model(self, view: View, lights: tuple[ReferenceLight, ...] | None = None, **how: Any) -> FogModel:
         """Return the paths of the light that the image holds; `how`: see `scattering_paths`."""
@@ -73,7 +73,7 @@ class Seen:
 
     def pixels_of_rays(self, most: int) -> int:
         """Return how many pixels so many rays allow, or the fewest that are looked at."""
-        return max(_FEWEST, most // ((_SIDE**2 if self.area else 1) * (self.samples if self.truth.area else 1)))
+        return max(_FEWEST, most // ((_SIDE**2 if self.area else 1) * (self.samples if self.reference.area else 1)))
 
     def held(self, layers: Array) -> Array:
         """Return the light that the image holds of airlight and surfaces, (2, m, 3)."""
@@ -82,7 +82,9 @@ class Seen:
     def _with_partners(self, pixels: Index, apart: int) -> Index:
         """Return pixels, and those to the right of them that can take part too."""
         partners = pixels + apart
-        partners = partners[(pixels % self.truth.width + apart < self.truth.width) & (partners < len(self.used))]
+        partners = partners[
+            (pixels % self.reference.width + apart < self.reference.width) & (partners < len(self.used))
+        ]
         return np.asarray(np.union1d(pixels, partners[self.used[partners]]), dtype=np.int64)
 
 
@@ -99,16 +101,16 @@ def seen_image(
         raise InputError(
             f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
         )
-    truth = read_reference(scene)
-    if isinstance(truth.medium, GridMedium):
+    reference = read_reference(scene)
+    if isinstance(reference.medium, GridMedium):
         raise InputError(
             "the medium is a density grid, whose images fits and diagnoses do not predict; wanted homogeneous media or "
             "height fog: compare with the reference alone, without --fit and --diagnose"
         )
-    if truth.sky is not None:
+    if reference.sky is not None:
         raise InputError(
-            f"light '{truth.background.id()}' is a sky, whose light fits and diagnoses do not know; wanted lights of "
-            "type 'point', 'spot', 'directional' or 'area'"
+            f"light '{reference.background.id()}' is a sky, whose light fits and diagnoses do not know; wanted lights "
+            "of type 'point', 'spot', 'directional' or 'area'"
         )
     values = np.asarray(judged.values, dtype=np.float64)
     values = np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
@@ -118,11 +120,15 @@ def seen_image(
     if chosen is not None:
         used &= np.asarray(chosen).ravel()
         finite |= ~np.asarray(chosen).ravel()
-    if (truth.area or truth.background is not None) and judged.holds == TOTAL and judged.emitted:
-        lit = emitted_light(truth, surface_hits(truth).distance).any(axis=1).reshape(truth.height, truth.width)
+    if (reference.area or reference.background is not None) and judged.holds == TOTAL and judged.emitted:
+        lit = (
+            emitted_light(reference, surface_hits(reference).distance)
+            .any(axis=1)
+            .reshape(reference.height, reference.width)
+        )
         used &= ~binary_dilation(lit, np.ones((3, 3), dtype=bool)).ravel()
-    seen = Seen(truth, values, judged.holds, np.asarray(used), samples=needed_samples(truth))
-    return seen, wrong_pixels(~finite.reshape(truth.height, truth.width), "left out, NaN or infinite")
+    seen = Seen(reference, values, judged.holds, np.asarray(used), samples=needed_samples(reference))
+    return seen, wrong_pixels(~finite.reshape(reference.height, reference.width), "left out, NaN or infinite")
 
 
 def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> tuple[JudgedLayer, ...]:
@@ -156,16 +162,16 @@ def best_kind(
     return min(found, key=error)
 
 
-def needed_samples(truth: ReferenceScene) -> int:
+def needed_samples(reference: ReferenceScene) -> int:
     """Return how many samples stand for an area light: twice as many until the image hardly changes.
 
     A window before pillars needs 128 where a lamp above an edge needs 16: each sample has shadows of its own.
     """
-    samples, fog = SAMPLES, scene_fog(truth)
-    if not truth.area:
+    samples, fog = SAMPLES, scene_fog(reference)
+    if not reference.area:
         return samples
-    count = truth.width * truth.height
-    view = view_of(truth, np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(np.int64)))
+    count = reference.width * reference.height
+    view = view_of(reference, np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(np.int64)))
 
     def image(samples: int) -> Array:
         return FogModel(view, scattering_paths(view, samples=samples)).layers(fog).sum(axis=0)
@@ -184,9 +190,9 @@ def at_places(seen: Seen, places: dict[int, tuple[float, float, float]]) -> Seen
     """Return an image of a scene with point or spot lights, by number, at other places [m]."""
     lights = tuple(
         replace(light, position=np.array(places[number])) if number in places else light
-        for number, light in enumerate(seen.truth.lights)
+        for number, light in enumerate(seen.reference.lights)
     )
-    return replace(seen, truth=replace(seen.truth, lights=lights))
+    return replace(seen, reference=replace(seen.reference, lights=lights))
 
 
 def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Estimates of the truth, computed or taken from the cache, and held against each other.
+"""Estimates of the reference, computed or taken from the cache, and held against each other.
 
 Read in this order:
 

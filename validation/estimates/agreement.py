@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The routes to the truth against each other: the quadrature image, our own integrator and Mitsuba's path tracer.
+"""The routes to the reference against each other: the quadrature image, our own integrator and Mitsuba's path tracer.
 
 They share no code but Mitsuba's ray casting. `single-scatter` estimates the same integral as the quadrature by other
 means: agreement of a few hundredths of a percent says that neither has a fault. `volpath` is code that nobody here
@@ -62,7 +62,7 @@ class Agreement:
     epsilon: float  #: the shadow-ray epsilon that was corrected for; 0 for single-scatter, which has none
     masked: int  #: pixels left out because a light is close to their ray
     statistics: Statistics  #: of the estimator against the quadrature, for volpath that of the shortened shadow ray
-    uncorrected_bias: float  #: pooled relative bias against the plain truth
+    uncorrected_bias: float  #: pooled relative bias against the plain reference
     finished: bool = True  #: whether the intervals became as narrow as wanted; else time or batches ran out before
 
 
@@ -187,9 +187,9 @@ def _bias(expected: Array, batches: Batches, layer: str, mask: Mask) -> float:
     return float(layer_mean(batches, layer, mask)[mask].sum() / expected[mask].sum() - 1)
 
 
-def layer_masks(truth: ReferenceScene, image: ReferenceImage) -> dict[str, Mask]:
+def layer_masks(reference: ReferenceScene, image: ReferenceImage) -> dict[str, Mask]:
     """Return the pixels to compare, by layer, (height, width): of the airlight those whose ray keeps off the lights."""
-    near = image.light_angle <= MASK_PIXELS * pixel_angle(truth)
+    near = image.light_angle <= MASK_PIXELS * pixel_angle(reference)
     return {"airlight": ~near & np.isfinite(image.airlight).all(axis=2), "surface": np.ones_like(near)}
 
 
@@ -222,8 +222,8 @@ def width_to_reach(statistics: Statistics, margin: float) -> float:
     return 0.5 * (high - low) / (0.4 * margin)
 
 
-def pixel_angle(truth: ReferenceScene) -> float:
+def pixel_angle(reference: ReferenceScene) -> float:
     """Return the angle between the two pixels in the middle of the image [rad]."""
-    middle = (truth.height // 2) * truth.width + truth.width // 2
-    beside = middle - 1 if truth.width > 1 else middle
-    return float(np.arccos(np.clip(truth.direction[middle] @ truth.direction[beside], -1, 1)))
+    middle = (reference.height // 2) * reference.width + reference.width // 2
+    beside = middle - 1 if reference.width > 1 else middle
+    return float(np.arccos(np.clip(reference.direction[middle] @ reference.direction[beside], -1, 1)))

@@ -71,22 +71,22 @@ class Budget:
             raise InputError(f"--error: got {self.error:g}, wanted less than 1; 0.01 is 1 %")
 
 
-def whole_reference(loaded: LoadedScene, truth: ReferenceImage, *, pixel: str = "centre") -> Image:
-    """Return the quadrature truth of a loaded scene as layers; the header says of which bytes of the scene."""
-    image = layered_reference(loaded.name, truth)
+def whole_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: str = "centre") -> Image:
+    """Return the quadrature reference of a loaded scene as layers; the header says of which bytes of the scene."""
+    image = layered_reference(loaded.name, reference)
     made = {"airlight:pixel": pixel, "airlight:scene_digest": scene_digest(loaded.scene)}
     return replace(image, attributes=dict(image.attributes) | made)
 
 
-def layered_reference(name: str, truth: ReferenceImage) -> Image:
-    """Return the quadrature truth of the scene of that name as layers."""
-    layers = {"airlight": truth.airlight, "airlight_bound": truth.airlight_bound, "surface": truth.surface}
-    extent = {"airlight_se": truth.airlight_se, "surface_se": truth.surface_se, "emitted": truth.emitted}
+def layered_reference(name: str, reference: ReferenceImage) -> Image:
+    """Return the quadrature reference of the scene of that name as layers."""
+    layers = {"airlight": reference.airlight, "airlight_bound": reference.airlight_bound, "surface": reference.surface}
+    extent = {"airlight_se": reference.airlight_se, "surface_se": reference.surface_se, "emitted": reference.emitted}
     layers |= {layer: values for layer, values in extent.items() if values is not None}
     made: dict[str, str | int | float] = {"airlight:scene": name, "airlight:estimator": "quadrature"}
-    if truth.airlight_se is not None:
+    if reference.airlight_se is not None:
         made["airlight:batches"] = REPLICATES
-    return Image(layers, truth.distance, made)
+    return Image(layers, reference.distance, made)
 
 
 @dataclass(frozen=True)
@@ -121,10 +121,10 @@ def monte_carlo_reference(
     """
     seen = None
     if orders is None:
-        truth = read_reference(loaded.scene)
-        distance = surface_hits(truth).distance
-        near = near_light(truth, distance)
-        shape = truth.height, truth.width
+        reference = read_reference(loaded.scene)
+        distance = surface_hits(reference).distance
+        near = near_light(reference, distance)
+        shape = reference.height, reference.width
     else:
         clouds = read_clouds(loaded.scene)
         seen = seen_clouds(clouds)
@@ -263,15 +263,15 @@ def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> dict[str, floa
     return {"pooled": pooled, "worst": worst}
 
 
-def near_light(truth: ReferenceScene, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
+def near_light(reference: ReferenceScene, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which pixels' rays pass a light that they see within `MASK_PIXELS` pixel widths, (pixels,).
 
     `distance` is that to the visible surface, (pixels,) [m].
     """
-    widest = MASK_PIXELS * pixel_angle(truth)
-    near = np.zeros(len(truth.direction), dtype=bool)
-    for light in truth.lights:
-        origin = np.broadcast_to(truth.origin, truth.direction.shape)
-        foot, height = foot_and_height(origin, truth.direction, light.position)
+    widest = MASK_PIXELS * pixel_angle(reference)
+    near = np.zeros(len(reference.direction), dtype=bool)
+    for light in reference.lights:
+        origin = np.broadcast_to(reference.origin, reference.direction.shape)
+        foot, height = foot_and_height(origin, reference.direction, light.position)
         near |= (foot > 0) & (foot < distance) & (np.arctan2(height, foot) <= widest)
     return near

@@ -162,13 +162,13 @@ def batch_tracer(
 ) -> tuple[tuple[str, ...], Trace]:
     """Return the layers of a batch, and the function that traces one from its seed; see `monte_carlo_batches`."""
     if orders is None:
-        truth = read_reference(scene)
-        check_camera(truth)
-        check_rays(truth, surface_hits(truth).distance)
+        reference = read_reference(scene)
+        check_camera(reference)
+        check_rays(reference, surface_hits(reference).distance)
         if estimator == "volpath":
-            return LAYERS, lambda seed: volpath_batch(truth, seed, samples, max_depth=max_depth, counts=counts)
+            return LAYERS, lambda seed: volpath_batch(reference, seed, samples, max_depth=max_depth, counts=counts)
         if estimator == "single-scatter" and max_depth == 2 and counts is None:
-            return LAYERS, lambda seed: single_scatter_batch(truth, seed, samples)
+            return LAYERS, lambda seed: single_scatter_batch(reference, seed, samples)
     else:
         from validation.slab.request import order_range
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The truth of a scene, from the cache where it was computed before, and what the image of a renderer holds of it.
+"""The reference of a scene, from the cache where it was computed before, and what the image of a renderer holds of it.
 
 Refused are references that are infinite, of rays that meet a light, and what is not finite for any other reason.
 
@@ -54,7 +54,7 @@ _USUAL: dict[str, Any] = {"checks": 32, "shadow_scale": 1.0, "pixel": "centre"}
 def reference_image(
     scene, *, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", progress: Progress | None = None
 ) -> ReferenceImage:
-    """Return the quadrature truth of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
+    """Return the quadrature reference of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
     `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`.
     Radiance that is not finite is refused.
@@ -72,41 +72,45 @@ def kept_reference(
     if stored is not None:
         values = {each.name: _as_kept(each, stored.arrays.get(each.name)) for each in fields(ReferenceImage)}
         return ReferenceImage(**values), stored
-    truth = read_reference(scene)
+    reference = read_reference(scene)
     parts = _Parts(key)
     # Only area lights take so long that a run is worth going on with.
-    keep = parts if truth.area and settings["pixel"] == "centre" else None
-    image = _checked_image(truth, settings, keep=keep, progress=progress)
+    keep = parts if reference.area and settings["pixel"] == "centre" else None
+    image = _checked_image(reference, settings, keep=keep, progress=progress)
     stored = _store(key, image, spent())
     parts.drop()
     return image, stored
 
 
 def reference_of_pixels(scene, pixels: NDArray[np.integer]) -> ReferenceImage:
-    """Return the quadrature truth of pixels of a Mitsuba scene by number, row by row, (1, count, 3); it is not kept."""
+    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row, (1, count, 3); not kept."""
     whole = read_reference(scene)
     return _checked_image(replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels]), _USUAL)
 
 
 def _checked_image(
-    truth: ReferenceScene, settings: Mapping[str, Any], *, keep: Keep | None = None, progress: Progress | None = None
+    reference: ReferenceScene,
+    settings: Mapping[str, Any],
+    *,
+    keep: Keep | None = None,
+    progress: Progress | None = None,
 ) -> ReferenceImage:
-    """Return the truth of an image whose every value is finite."""
-    check_camera(truth)
+    """Return the reference of an image whose every value is finite."""
+    check_camera(reference)
     if settings["pixel"] == "centre":
-        check_rays(truth, surface_hits(truth).distance)
-    image = quadrature_image(truth, **settings, keep=keep, progress=progress)
-    check_values(truth, image)
+        check_rays(reference, surface_hits(reference).distance)
+    image = quadrature_image(reference, **settings, keep=keep, progress=progress)
+    check_values(reference, image)
     return image
 
 
 def keep_reference(scene, image: ReferenceImage, spent: Spent, *, pixel: str = "centre") -> None:
-    """Keep a truth that another process computed by `reference_image`, and what it took, so that this one finds it."""
+    """Keep a reference that another process computed by `reference_image`, and what it took, for this one to find."""
     _store(_key(scene, _USUAL | {"pixel": pixel}), image, spent)
 
 
 def has_reference(scene, *, pixel: str = "centre") -> bool:
-    """Return whether the truth of a scene is kept."""
+    """Return whether the reference of a scene is kept."""
     return is_kept(_key(scene, _USUAL | {"pixel": pixel}))
 
 
@@ -120,7 +124,7 @@ def _store(key: str, image: ReferenceImage, spent: Spent) -> Kept:
 
 
 class _Parts:
-    """Parts of a truth, kept until it is done: a run that was interrupted goes on from them."""
+    """Parts of a reference, kept until it is done: a run that was interrupted goes on from them."""
 
     def __init__(self, key: str) -> None:
         self._key, self._names = key, list[str]()
@@ -140,7 +144,7 @@ def _as_kept(field: Field, value: Any) -> Any:
     return field.type(value) if field.type in (int, float) else value
 
 
-def reference_layer(truth: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:
+def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:
     """Return 'airlight', 'surface' or 'total', (height, width, 3) [W/(m^2 sr)].
 
     A renderer shows the area lights that the camera sees: Mitsuba's integrators do unless `hide_emitters` is set, and
@@ -150,45 +154,45 @@ def reference_layer(truth: ReferenceImage, layer: str, *, emitted: bool = True) 
     default, `hide_emitters`), compare the layer `airlight`, or leave the lights out here.
     """
     if layer != TOTAL:
-        return np.asarray(getattr(truth, layer))
-    total = truth.airlight + truth.surface
-    return total if truth.emitted is None or not emitted else total + truth.emitted
+        return np.asarray(getattr(reference, layer))
+    total = reference.airlight + reference.surface
+    return total if reference.emitted is None or not emitted else total + reference.emitted
 
 
-def reference_error(truth: ReferenceImage, layer: str) -> Array | None:
+def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
     """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without area lights, where it is 0.
 
     Airlight and surface have draws of their own, so that the variances of the total add up; what lights emit is exact.
     """
-    if truth.airlight_se is None or truth.surface_se is None:
+    if reference.airlight_se is None or reference.surface_se is None:
         return None
     if layer == TOTAL:
-        return np.hypot(truth.airlight_se, truth.surface_se)
-    return np.asarray(getattr(truth, f"{layer}_se"))
+        return np.hypot(reference.airlight_se, reference.surface_se)
+    return np.asarray(getattr(reference, f"{layer}_se"))
 
 
-def check_camera(truth: ReferenceScene) -> None:
+def check_camera(reference: ReferenceScene) -> None:
     """Refuse a scene whose camera is at a light, whose every pixel is infinite."""
-    for number, light in enumerate(truth.lights, 1):
-        distance = float(np.linalg.norm(light.position - truth.origin))
-        if distance <= _uncertainty(truth, light) and _scatters(truth, light):
+    for number, light in enumerate(reference.lights, 1):
+        distance = float(np.linalg.norm(light.position - reference.origin))
+        if distance <= _uncertainty(reference, light) and _scatters(reference, light):
             raise InputError(
                 f"{_name(number, light)} is {distance:.3g} m from the camera: the airlight, which grows like "
                 "1/distance, is infinite in every pixel; move the light or the camera"
             )
 
 
-def check_rays(truth: ReferenceScene, distance: Array) -> None:
+def check_rays(reference: ReferenceScene, distance: Array) -> None:
     """Refuse rays through pixel centres that meet a light before the visible surface, so far away, (rays,) [m]."""
     ends = np.ravel(distance)
-    for number, light in enumerate(truth.lights, 1):
-        origin = np.broadcast_to(truth.origin, truth.direction.shape)
-        foot, height = foot_and_height(origin, truth.direction, light.position)
-        known = _uncertainty(truth, light)
-        meets = (height <= known) & (foot > 0) & (foot <= ends + known) & _looks_along(light, truth.direction)
-        if meets.any() and _scatters(truth, light):
+    for number, light in enumerate(reference.lights, 1):
+        origin = np.broadcast_to(reference.origin, reference.direction.shape)
+        foot, height = foot_and_height(origin, reference.direction, light.position)
+        known = _uncertainty(reference, light)
+        meets = (height <= known) & (foot > 0) & (foot <= ends + known) & _looks_along(light, reference.direction)
+        if meets.any() and _scatters(reference, light):
             pixel = int(np.argmax(meets))
-            row, column = divmod(pixel, truth.width)
+            row, column = divmod(pixel, reference.width)
             raise InputError(
                 f"{_name(number, light)} is {height[pixel]:.3g} m from the ray through the centre of the pixel in "
                 f"column {column} of row {row}: the airlight there, which grows like 1/distance, is infinite; move the "
@@ -196,17 +200,17 @@ def check_rays(truth: ReferenceScene, distance: Array) -> None:
             )
 
 
-def check_values(truth: ReferenceScene, image: ReferenceImage) -> None:
-    """Refuse a truth that is not finite, by its first pixel."""
+def check_values(reference: ReferenceScene, image: ReferenceImage) -> None:
+    """Refuse a reference that is not finite, by its first pixel."""
     for what in ("airlight", "airlight_bound", "surface"):
         values: Any = getattr(image, what)
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
             raise InputError(
-                f"the truth has {int(wrong.sum())} of {wrong.size} pixels whose {what} is not finite, first in column "
-                f"{column} of row {row}; a light may lie on its ray, or a number of the scene be too large: move the "
-                "light, or use other units"
+                f"the reference has {int(wrong.sum())} of {wrong.size} pixels whose {what} is not finite, first in "
+                f"column {column} of row {row}; a light may lie on its ray, or a number of the scene be too large: "
+                "move the light, or use other units"
             )
 
 
@@ -214,15 +218,15 @@ def _name(number: int, light: ReferenceLight) -> str:
     return f"light {number} at ({', '.join(f'{coordinate:g}' for coordinate in light.position)})"
 
 
-def _uncertainty(truth: ReferenceScene, light: ReferenceLight) -> float:
+def _uncertainty(reference: ReferenceScene, light: ReferenceLight) -> float:
     """Return how well the distance from the camera to a light is known [m]."""
-    return _ROUNDING * float(max(np.abs(light.position).max(), np.abs(truth.origin).max()))
+    return _ROUNDING * float(max(np.abs(light.position).max(), np.abs(reference.origin).max()))
 
 
-def _scatters(truth: ReferenceScene, light: ReferenceLight) -> bool:
+def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
     """Return whether there is a medium where a light is: beside it the airlight is finite."""
-    inside = [medium for medium in truth.media if holds(medium.bounds, light.position)]
-    medium = inside[0] if inside else truth.medium
+    inside = [medium for medium in reference.media if holds(medium.bounds, light.position)]
+    medium = inside[0] if inside else reference.medium
     return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))
 
 

@@ -90,7 +90,7 @@ def ratio_tracking(look: Look, random: np.random.Generator, times: int, majorant
 
 
 def transmittance_errors(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     steps: Sequence[int],
     *,
     progress: Callable[[float, str], None] | None = None,
@@ -105,13 +105,13 @@ def transmittance_errors(
     one estimate, and `jensen`, the brightening that follows from the variance of a march, to second order, None for
     others. Raises InputError for a scene without a grid.
     """
-    medium = truth.medium
+    medium = reference.medium
     if not isinstance(medium, GridMedium):
         raise InputError("transmittance: the scene has no density grid around its camera; wanted one, such as smoke")
     random = np.random.default_rng(1)
     begin, end = medium.low + random.random((2, _RAYS, 3)) * (medium.high - medium.low)
     length = np.linalg.norm(end - begin, axis=1)
-    depth = field_of(truth).optical_depth(begin, (end - begin) / length[:, None], np.zeros(_RAYS), length)[:, 0]
+    depth = field_of(reference).optical_depth(begin, (end - begin) / length[:, None], np.zeros(_RAYS), length)[:, 0]
     exact = np.exp(-depth)
     found: dict[tuple[str, int], list[tuple[float, float, float, float]]] = {}
 

@@ -152,7 +152,7 @@ def fit_image(
     kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene, mask=mask)
-    unknowns = read_unknowns(parameters, seen.truth, scene_fog(seen.truth), starts or {})
+    unknowns = read_unknowns(parameters, seen.reference, scene_fog(seen.reference), starts or {})
     seen = replace(seen, used=seen.used & ~_cut_off(seen))
     fewest = max(_FEWEST, 4 * len(unknowns))
     if int(seen.used.sum()) < fewest:
@@ -226,12 +226,14 @@ def _solved(
 
 
 def _size(seen: Seen) -> float:
-    return max((float(np.linalg.norm(light.position - seen.truth.origin)) for light in seen.truth.lights), default=1.0)
+    return max(
+        (float(np.linalg.norm(light.position - seen.reference.origin)) for light in seen.reference.lights), default=1.0
+    )
 
 
 def _moved(seen: Seen, unknowns: Sequence[Unknown], values: Sequence[float]) -> tuple[Seen, tuple[Unknown, ...]]:
     """Return an image with the lights where parameters put them, and the parameters relative to there."""
-    places = {number: list(light.position) for number, light in enumerate(seen.truth.lights)}
+    places = {number: list(light.position) for number, light in enumerate(seen.reference.lights)}
     moved = list(unknowns)
     for row, (unknown, value) in enumerate(zip(unknowns, values, strict=True)):
         if unknown.moves:

@@ -84,7 +84,7 @@ class ImageModel:
     @staticmethod
     def of(seen: Seen, *, most: int = 20_000) -> "ImageModel":
         """Return the model of an image; so many rays are looked at: more say nothing new of few numbers."""
-        return ImageModel(seen, seen.model(seen.view(most=most)), scene_fog(seen.truth))
+        return ImageModel(seen, seen.model(seen.view(most=most)), scene_fog(seen.reference))
 
     @property
     def image(self) -> Array:

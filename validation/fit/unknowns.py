@@ -105,16 +105,16 @@ class Unknown:
 
 
 def read_unknowns(
-    names: Sequence[str], truth: ReferenceScene, fog: Fog, starts: Mapping[str, float]
+    names: Sequence[str], reference: ReferenceScene, fog: Fog, starts: Mapping[str, float]
 ) -> tuple[Unknown, ...]:
     """Return the parameters that names stand for.
 
-    `truth`, `fog`: the scene, and what it says of the fog; `starts`: values to begin with, by name; the scene's own by
-    default.
+    `reference`, `fog`: the scene, and what it says of the fog; `starts`: values to begin with, by name; the scene's own
+    by default.
     """
     if not names:
         raise InputError(f"fit: got none, wanted some of {', '.join(NAMES)}")
-    unknowns = tuple(unknown for name in names for unknown in _read(name, truth, fog))
+    unknowns = tuple(unknown for name in names for unknown in _read(name, reference, fog))
     seen: set[tuple[str, int, int]] = set()
     for unknown in unknowns:
         places = {(unknown.kind, unknown.number, channel) for channel in unknown.channels}
@@ -137,7 +137,7 @@ def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[float] | 
     return fog
 
 
-def _read(name: str, truth: ReferenceScene, fog: Fog) -> list[Unknown]:
+def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
     word, _, place = name.partition(":")
     kind, channels = word, tuple(range(3))
     for channel, letter in enumerate(CHANNELS):
@@ -158,17 +158,17 @@ def _read(name: str, truth: ReferenceScene, fog: Fog) -> list[Unknown]:
     if kind in ("sigma_t", "albedo", "phase.g"):
         return [
             each
-            for number in _media(name, place, truth, fog)
-            for each in _of_medium(kind, channels, number, truth, fog)
+            for number in _media(name, place, reference, fog)
+            for each in _of_medium(kind, channels, number, reference, fog)
         ]
-    return [_of_light(kind, number, truth) for number in _lights(name, place, kind, truth)]
+    return [_of_light(kind, number, reference) for number in _lights(name, place, kind, reference)]
 
 
-def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: ReferenceScene, fog: Fog) -> list[Unknown]:
+def _of_medium(kind: str, channels: tuple[int, ...], number: int, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
     several = len(_scattering(fog)) > 1
-    ending = f":{_medium_name(number, truth)}" if several else ""
+    ending = f":{_medium_name(number, reference)}" if several else ""
     if kind == "phase.g":
-        phase = (truth.medium, *truth.media)[number].phase
+        phase = (reference.medium, *reference.media)[number].phase
         if not phase.is_constant and phase.name != "hg":
             raise InputError(
                 f"fit: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has '{phase.name}'"
@@ -193,15 +193,15 @@ def _of_medium(kind: str, channels: tuple[int, ...], number: int, truth: Referen
     ]
 
 
-def _of_light(kind: str, number: int, truth: ReferenceScene) -> Unknown:
-    names = light_names(truth)
+def _of_light(kind: str, number: int, reference: ReferenceScene) -> Unknown:
+    names = light_names(reference)
     name = kind + (f":{names[number]}" if len(names) > 1 else "")
     if kind == "intensity":
         return Unknown(name, kind, number, (0, 1, 2), 1.0, _LOG, "1")
-    if number >= len(truth.lights):
+    if number >= len(reference.lights):
         raise InputError(f"fit: got '{name}', wanted the position of a point or spot light")
     return Unknown(
-        name, kind, number, (0, 1, 2), float(truth.lights[number].position[AXES.index(kind[-1])]), _PLAIN, "m"
+        name, kind, number, (0, 1, 2), float(reference.lights[number].position[AXES.index(kind[-1])]), _PLAIN, "m"
     )
 
 
@@ -231,25 +231,25 @@ def _scattering(fog: Fog) -> list[int]:
     return [number for number, sigma_t in enumerate(fog.sigma_t) if max(sigma_t) > 0]
 
 
-def _medium_name(number: int, truth: ReferenceScene) -> str:
-    return "medium" if number == 0 else truth.media[number - 1].name
+def _medium_name(number: int, reference: ReferenceScene) -> str:
+    return "medium" if number == 0 else reference.media[number - 1].name
 
 
-def light_names(truth: ReferenceScene) -> list[str]:
+def light_names(reference: ReferenceScene) -> list[str]:
     """Return the ids of the lights, in the order of their paths."""
-    return [source.name for source in light_sources(truth)]
+    return [source.name for source in light_sources(reference)]
 
 
-def _media(name: str, place: str, truth: ReferenceScene, fog: Fog) -> list[int]:
+def _media(name: str, place: str, reference: ReferenceScene, fog: Fog) -> list[int]:
     there = _scattering(fog)
-    return _chosen(name, place, there, [_medium_name(number, truth) for number in there], "medium")
+    return _chosen(name, place, there, [_medium_name(number, reference) for number in there], "medium")
 
 
-def _lights(name: str, place: str, kind: str, truth: ReferenceScene) -> list[int]:
-    names = light_names(truth)
+def _lights(name: str, place: str, kind: str, reference: ReferenceScene) -> list[int]:
+    names = light_names(reference)
     numbers = list(range(len(names)))
     if kind != "intensity" and not place:
-        numbers, names = numbers[: len(truth.lights)], names[: len(truth.lights)]
+        numbers, names = numbers[: len(reference.lights)], names[: len(reference.lights)]
     return _chosen(name, place, numbers, names, "light")
 
 

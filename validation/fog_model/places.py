@@ -91,7 +91,7 @@ def no_places(media: int, *, surface: bool) -> Places:
 
 
 def point_nodes(
-    truth: ReferenceScene, light: ReferenceLight, reach: LitRays, ends: tuple[Array, Array] | None = None
+    reference: ReferenceScene, light: ReferenceLight, reach: LitRays, ends: tuple[Array, Array] | None = None
 ) -> Places:
     """Return the nodes of a point or spot light, or of a sample of an area light.
 
@@ -104,14 +104,14 @@ def point_nodes(
         x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
     used = x1 > x0
     ray, x0, x1 = ray[used], x0[used], x1[used]
-    if not truth.media:
-        x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(truth, light.position), x1)
-        if isinstance(truth.medium, HeightMedium):
-            pieces = _by_height(truth, (ray, x0, x1))
+    if not reference.media:
+        x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(reference, light.position), x1)
+        if isinstance(reference.medium, HeightMedium):
+            pieces = _by_height(reference, (ray, x0, x1))
             ray, x0, x1 = pieces.ray, pieces.x0, pieces.x1
         medium = np.full(len(ray), AROUND)
     else:
-        pieces, _ = smooth_pieces(truth, rays, camera_segments(truth, reach.distance), (ray, x0, x1))
+        pieces, _ = smooth_pieces(reference, rays, camera_segments(reference, reach.distance), (ray, x0, x1))
         # The reference counts media with bounds from 0 and calls what surrounds them -1.
         ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
     foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]
@@ -119,11 +119,11 @@ def point_nodes(
     height = np.maximum(rays.height[ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
     start = np.arcsinh(s0 / height)
     width = np.arcsinh(s1 / height) - start
-    if isinstance(truth.medium, HeightMedium):
+    if isinstance(reference.medium, HeightMedium):
         piece, start, width = equal_panels(np.arange(len(ray)), start, width, np.maximum(np.ceil(width / _PANEL), 1))
         low, high = (foot[piece] + height[piece] * np.sinh(w) for w in (start, start + width))
-        low, high = _heights(truth, ray[piece], low), _heights(truth, ray[piece], high)
-        span = _scale_heights(truth.medium, low, high) / _SCALE_HEIGHTS
+        low, high = _heights(reference, ray[piece], low), _heights(reference, ray[piece], high)
+        span = _scale_heights(reference.medium, low, high) / _SCALE_HEIGHTS
         number, start, width = equal_panels(np.arange(len(piece)), start, width, np.clip(np.ceil(span), 1, _MOST))
         piece = piece[number]
         ray, foot, height, medium = ray[piece], foot[piece], height[piece], medium[piece]
@@ -136,38 +136,38 @@ def point_nodes(
     along = profile_of(light, rays)
     profile = 1.0 if along is None else along(x[:, None], ray)[:, 0]
     towards = sine[:, None] * direction + (1 / np.cosh(w))[:, None] * normal
-    camera, leg = lengths(truth, truth.origin, direction, x), lengths(truth, light.position, towards, r)
+    camera, leg = lengths(reference, reference.origin, direction, x), lengths(reference, light.position, towards, r)
     return Places(ray, x, r, towards, camera, leg, medium[owner], -sine, (weight * r * profile)[:, None])
 
 
 def parallel_nodes(
-    truth: ReferenceScene, light: DirectionalLight, reach: LitRays, ends: tuple[Array, Array] | None = None
+    reference: ReferenceScene, light: DirectionalLight, reach: LitRays, ends: tuple[Array, Array] | None = None
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
     rays = reach.rays
-    ray, x0, x1 = sun_stretches(truth, reach)
+    ray, x0, x1 = sun_stretches(reference, reach)
     if ends is not None:
         x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
     used = x1 > x0
     stretches = ray[used], x0[used], x1[used]
-    if isinstance(truth.medium, HeightMedium):
-        pieces, depth = _before_sun(truth, light, stretches)
+    if isinstance(reference.medium, HeightMedium):
+        pieces, depth = _before_sun(reference, light, stretches)
     else:
-        pieces, _ = smooth_pieces(truth, rays, camera_segments(truth, reach.distance), stretches)
-        depth = (pieces.x1 - pieces.x0) * by_medium(truth, "sigma_t", pieces.medium).max(axis=1)
+        pieces, _ = smooth_pieces(reference, rays, camera_segments(reference, reach.distance), stretches)
+        depth = (pieces.x1 - pieces.x0) * by_medium(reference, "sigma_t", pieces.medium).max(axis=1)
     width, depth = pieces.x1 - pieces.x0, np.maximum(depth, 1e-300)
     owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)
     place, weight, ray = place / depth[owner], weight / depth[owner], pieces.ray[owner]
-    x, direction = pieces.x0[owner] + width[owner] * place, truth.direction[ray]
-    point, endless = truth.origin + x[:, None] * direction, np.full(len(x), np.inf)
-    leg = lengths(truth, point, np.broadcast_to(-light.direction, point.shape), endless)
-    camera, medium = lengths(truth, truth.origin, direction, x), pieces.medium[owner] + 1
+    x, direction = pieces.x0[owner] + width[owner] * place, reference.direction[ray]
+    point, endless = reference.origin + x[:, None] * direction, np.full(len(x), np.inf)
+    leg = lengths(reference, point, np.broadcast_to(-light.direction, point.shape), endless)
+    camera, medium = lengths(reference, reference.origin, direction, x), pieces.medium[owner] + 1
     value = (weight * width[owner])[:, None]
     return Places(ray, x, np.ones_like(x), 0 * direction, camera, leg, medium, rays.foot[ray], value)
 
 
 def surface_points(
-    truth: ReferenceScene, light: ReferenceLight | DirectionalLight, distance: Array, reflected: Array, lit: Bools
+    reference: ReferenceScene, light: ReferenceLight | DirectionalLight, distance: Array, reflected: Array, lit: Bools
 ) -> Places:
     """Return the visible surface points that a light reaches: L = f(w_i, w_o) cos I profile / r^2.
 
@@ -175,19 +175,19 @@ def surface_points(
     the light reaches, (rays,).
     """
     ray = np.flatnonzero(lit & np.any(reflected > 0, axis=1))
-    direction, x = truth.direction[ray], distance[ray]
-    point = truth.origin + x[:, None] * direction
+    direction, x = reference.direction[ray], distance[ray]
+    point = reference.origin + x[:, None] * direction
     if isinstance(light, DirectionalLight):
         r, towards, value = np.ones(len(ray)), np.zeros_like(point), reflected[ray]
         way = np.broadcast_to(-light.direction, point.shape)
-        leg = lengths(truth, point, way, np.full(len(ray), np.inf))
+        leg = lengths(reference, point, way, np.full(len(ray), np.inf))
     else:
         way = point - light.position
         r = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
         towards = way / r[:, None]
-        leg = lengths(truth, light.position, towards, r)
+        leg = lengths(reference, light.position, towards, r)
         value = reflected[ray] * (_profile(light, towards) / r**2)[:, None]
-    camera, none = lengths(truth, truth.origin, direction, x), np.empty(0)
+    camera, none = lengths(reference, reference.origin, direction, x), np.empty(0)
     return Places(ray, x, r, towards, camera, leg, none.astype(np.int64), none, value)
 
 
@@ -218,37 +218,37 @@ def panel_nodes(
     return owner[by_owner], np.concatenate(places)[by_owner], np.concatenate(weights)[by_owner]
 
 
-def lengths(truth: ReferenceScene, origin: Array, direction: Array, reach: Array) -> Array:
+def lengths(reference: ReferenceScene, origin: Array, direction: Array, reach: Array) -> Array:
     """Return how much of straight lines lies in each medium, that without bounds first, (n, media) [m].
 
     `origin`, `direction`: of the lines, (3,) or (n, 3) [m], and (n, 3); `reach`: how long they are, (n,) [m]; infinite
     where nothing surrounds the media, whose length is then given as 0.
     """
     inside = []
-    for medium in truth.media:
+    for medium in reference.media:
         enter, leave = crossings(medium.bounds, origin, direction)
         inside.append(np.maximum(np.minimum(leave, reach) - np.maximum(enter, 0.0), 0.0))
     around = np.where(np.isfinite(reach), reach, 0.0) - sum(inside)
     return np.stack([np.maximum(around, 0.0), *inside], axis=1)
 
 
-def _by_height(truth: ReferenceScene, stretches: tuple[Index, Array, Array]) -> Pieces:
+def _by_height(reference: ReferenceScene, stretches: tuple[Index, Array, Array]) -> Pieces:
     """Cut lit stretches where rays cross heights at which the density of height fog has kinks."""
-    medium = truth.medium
+    medium = reference.medium
     assert isinstance(medium, HeightMedium)
     if not len(stretches[0]):
         return whole(stretches)
     with np.errstate(divide="ignore", invalid="ignore"):
-        x = (np.array(fog_of(medium).kinks)[:, None] - truth.origin @ medium.up) / (truth.direction @ medium.up)
+        x = (np.array(fog_of(medium).kinks)[:, None] - reference.origin @ medium.up) / (reference.direction @ medium.up)
     number, ray = np.nonzero(np.isfinite(x) & (x > 0))
     return cut(whole(stretches), (ray, x[number, ray]))
 
 
-def _heights(truth: ReferenceScene, ray: Index, x: Array) -> Array:
+def _heights(reference: ReferenceScene, ray: Index, x: Array) -> Array:
     """Return the heights at distances along rays [m]."""
-    assert isinstance(truth.medium, HeightMedium)
-    up = truth.medium.up
-    return np.asarray(truth.origin @ up + x * (truth.direction[ray] @ up))
+    assert isinstance(reference.medium, HeightMedium)
+    up = reference.medium.up
+    return np.asarray(reference.origin @ up + x * (reference.direction[ray] @ up))
 
 
 def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
@@ -259,36 +259,38 @@ def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
 
 
 def _before_sun(
-    truth: ReferenceScene, light: DirectionalLight, stretches: tuple[Index, Array, Array]
+    reference: ReferenceScene, light: DirectionalLight, stretches: tuple[Index, Array, Array]
 ) -> tuple[Pieces, Array]:
     """Return pieces of lit stretches in height fog, and how long each is in optical depths and in height."""
-    medium = truth.medium
+    medium = reference.medium
     assert isinstance(medium, HeightMedium)
     fog, mu = fog_of(medium), float(-light.direction @ medium.up)
     ray, x0, x1 = stretches
-    x1 = np.where(np.isinf(x1), x0 + _long_enough(truth, truth.origin), x1)
-    pieces = _by_height(truth, (ray, x0, x1))
+    x1 = np.where(np.isinf(x1), x0 + _long_enough(reference, reference.origin), x1)
+    pieces = _by_height(reference, (ray, x0, x1))
     for _ in range(_HALVES):
         first = pieces.first
         middle = 0.5 * (pieces.x0 + pieces.x1)[first]
         pieces = cut(pieces, (pieces.ray[first], middle))
-    middle = _heights(truth, pieces.ray, 0.5 * (pieces.x0 + pieces.x1))
+    middle = _heights(reference, pieces.ray, 0.5 * (pieces.x0 + pieces.x1))
     pieces = pieces[np.isfinite(fog.log_density(middle))]
-    low, high = (_heights(truth, pieces.ray, x) for x in (pieces.x0, pieces.x1))
-    steep = 1 + np.abs(truth.direction[pieces.ray] @ medium.up) / mu
+    low, high = (_heights(reference, pieces.ray, x) for x in (pieces.x0, pieces.x1))
+    steep = 1 + np.abs(reference.direction[pieces.ray] @ medium.up) / mu
     depth = steep * fog.optical_depth(low, high, pieces.x1 - pieces.x0)
     return pieces, np.minimum(np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP)
 
 
-def _long_enough(truth: ReferenceScene, place: Array) -> float:
+def _long_enough(reference: ReferenceScene, place: Array) -> float:
     """Return how far behind its foot point from a place an unbounded ray is followed [m]."""
-    if isinstance(truth.medium, HeightMedium):
-        fog = fog_of(truth.medium)
+    if isinstance(reference.medium, HeightMedium):
+        fog = fog_of(reference.medium)
         bases = [layer.base for layer in fog.layers]
-        heights = np.clip([place @ truth.medium.up, truth.origin @ truth.medium.up, *bases], fog.floor, fog.cap)
+        heights = np.clip(
+            [place @ reference.medium.up, reference.origin @ reference.medium.up, *bases], fog.floor, fog.cap
+        )
         sigma_t = np.array([fog.density(heights).max()])
     else:
-        sigma_t = truth.medium.sigma_t
+        sigma_t = reference.medium.sigma_t
     return float(_NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min())) if np.any(sigma_t > 0) else 0.0
 
 

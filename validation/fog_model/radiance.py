@@ -82,11 +82,11 @@ class Fog:
         return np.asarray(np.einsum("kl,klpc->kpc", factors, by_light) * np.array(self.exposure))
 
 
-def scene_fog(truth: ReferenceScene) -> Fog:
+def scene_fog(reference: ReferenceScene) -> Fog:
     """Return the fog as the scene has it."""
-    media, medium = (truth.medium, *truth.media), truth.medium
+    media, medium = (reference.medium, *reference.media), reference.medium
     height, up = (fog_of(medium), colour(medium.up)) if isinstance(medium, HeightMedium) else (None, (0.0, 0.0, 1.0))
-    one = (1.0,) * (len(truth.lights) + len(truth.directional) + len(truth.area))
+    one = (1.0,) * (len(reference.lights) + len(reference.directional) + len(reference.area))
     return Fog(
         sigma_t=tuple(colour(each.sigma_t) for each in media) if height is None else ((1.0, 1.0, 1.0),),
         albedo=tuple(colour(medium.albedo) for medium in media),
@@ -143,11 +143,11 @@ class FogModel:
     def transmittance(self, fog: Fog) -> Array:
         """Return the fraction of light that the rays leave of what is at their ends, (m, 3) [1]."""
         view = self.view
-        slant = 1.0 if fog.spherical else 1 / (view.truth.direction @ view.axis)
+        slant = 1.0 if fog.spherical else 1 / (view.reference.direction @ view.axis)
         length = view.length.copy()
         length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * slant) - fog.near * slant, 0.0)
         if fog.height is not None:
-            origin, rise = view.truth.origin @ fog.up, view.truth.direction @ fog.up
+            origin, rise = view.reference.origin @ fog.up, view.reference.direction @ fog.up
             end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
             length[:, AROUND] = fog.height.along(origin, end, length[:, AROUND], rise)
         some = np.any(np.array(fog.sigma_t) > 0, axis=1)
@@ -159,7 +159,7 @@ class FogModel:
         """Return what the places send to each pixel, of a light of intensity 1, (m, 3)."""
         view = self.view
         layer = int(places.is_surface)
-        direction, pixel = view.truth.direction[places.ray], view.ray_pixel[places.ray]
+        direction, pixel = view.reference.direction[places.ray], view.ray_pixel[places.ray]
         slant = 1 / (direction @ view.axis)
         r, cosine, light, away = places.r, places.cosine, places.light, places.towards * places.r[:, None]
         if any(fog.moved[number]):
@@ -208,14 +208,14 @@ class FogModel:
 
         `away` is from the light to the places, (n, 3) [m]. Surfaces scatter by no density.
         """
-        truth, density = self.view.truth, fog.height
+        reference, density = self.view.reference, fog.height
         assert density is not None
-        origin = truth.origin @ fog.up
-        z = origin + places.x * (truth.direction[places.ray] @ fog.up)
-        camera, light, sun = camera.copy(), light.copy(), number - len(truth.lights)
+        origin = reference.origin @ fog.up
+        z = origin + places.x * (reference.direction[places.ray] @ fog.up)
+        camera, light, sun = camera.copy(), light.copy(), number - len(reference.lights)
         camera[:, AROUND] = density.optical_depth(origin, z, camera[:, AROUND])
-        if 0 <= sun < len(truth.directional):
-            light[:, AROUND] = density.column(z) / max(float(-truth.directional[sun].direction @ fog.up), 1e-300)
+        if 0 <= sun < len(reference.directional):
+            light[:, AROUND] = density.column(z) / max(float(-reference.directional[sun].direction @ fog.up), 1e-300)
         else:
             light[:, AROUND] = density.optical_depth(z - away @ fog.up, z, light[:, AROUND])
         return camera, light, np.zeros_like(z) if places.is_surface else density.log_density(z)
@@ -228,8 +228,8 @@ class FogModel:
             return law(cosine)
         key = number, medium  # the scene's own does not change, not even where a light moves a little
         if key not in self._phases:
-            truth = self.view.truth
-            own = (truth.medium, *truth.media)[medium].phase
+            reference = self.view.reference
+            own = (reference.medium, *reference.media)[medium].phase
             self._phases[key] = np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
         return self._phases[key]
 

@@ -43,7 +43,7 @@ _FEW = 1000  # rays
 class View:
     """The rays of some pixels."""
 
-    truth: ReferenceScene  #: the scene, with these rays in the place of its own
+    reference: ReferenceScene  #: the scene, with these rays in the place of its own
     pixels: Index  #: numbers of the pixels, row by row, ascending, (m,)
     ray_pixel: Index  #: by ray, which of these it belongs to, (rays,)
     axis: Array  #: of the camera, unit, (3,)
@@ -55,7 +55,7 @@ class View:
 
     def ends(self, planes: tuple[float, float], spherical: bool = False) -> tuple[Array, Array]:
         """Return the distances of two planes before the camera, or of two spheres around it, along the rays [m]."""
-        slant = 1.0 if spherical else 1 / (self.truth.direction @ self.axis)
+        slant = 1.0 if spherical else 1 / (self.reference.direction @ self.axis)
         near, far = (np.broadcast_to(plane * slant, self.distance.shape) for plane in planes)
         return near, far
 
@@ -63,18 +63,18 @@ class View:
         """Return which parts of the rays a light reaches; the shape of an area light does not shadow its samples."""
 
         def found() -> Any:
-            truth, shapes = self.truth, self.shapes
+            reference, shapes = self.reference, self.shapes
             if not shadows:
-                truth, shapes = replace(truth, occluders=mi.load_dict({"type": "scene"})), None
+                reference, shapes = replace(reference, occluders=mi.load_dict({"type": "scene"})), None
             elif area is not None:
-                truth, shapes = self._once(("before", area.name), lambda: before_light(truth, area))
+                reference, shapes = self._once(("before", area.name), lambda: before_light(reference, area))
             # Intervals by geometry are what they are: random checks only say how far to trust them.
             if isinstance(light, DirectionalLight):
-                return lit_parallel_rays(truth, light, self.distance, shapes=shapes, checks=0)
+                return lit_parallel_rays(reference, light, self.distance, shapes=shapes, checks=0)
             ball = self._ball(light, area)
             key = "near", ball.centre.tobytes(), ball.radius, shadows, None if area is None else area.name
-            known = self._once(key, lambda: obstacles(truth, ball, self.distance, shapes))
-            return lit_rays(truth, light, self.distance, known=known, checks=0)
+            known = self._once(key, lambda: obstacles(reference, ball, self.distance, shapes))
+            return lit_rays(reference, light, self.distance, known=known, checks=0)
 
         return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
 
@@ -88,7 +88,7 @@ class View:
         if not light.cosine and len(self.distance) > _FEW:
             return Ball(light.position)
         centre = min(
-            (own.position for own in self.truth.lights), key=lambda place: np.linalg.norm(light.position - place)
+            (own.position for own in self.reference.lights), key=lambda place: np.linalg.norm(light.position - place)
         )
         away = float(np.linalg.norm(light.position - centre))
         return Ball(centre, 4.0 ** np.ceil(np.log2(away) / 2 - 1e-9) if away > 0 else 0.0)
@@ -98,7 +98,7 @@ class View:
 
         def found() -> tuple[Array, Bools]:
             visible = np.isfinite(self.distance)
-            point = self.truth.origin + np.where(visible, self.distance, 0.0)[:, None] * self.truth.direction
+            point = self.reference.origin + np.where(visible, self.distance, 0.0)[:, None] * self.reference.direction
             facing = self.interaction.is_valid()
             if isinstance(light, DirectionalLight):
                 towards = np.broadcast_to(-light.direction, point.shape)
@@ -113,7 +113,7 @@ class View:
             reflected = as_rows(self.interaction.bsdf().eval(mi.BSDFContext(), self.interaction, local, facing))
             lit = visible & np.any(reflected > 0, axis=1)
             if shadows:
-                lit &= ~np.array(self.truth.occluders.ray_test(shadow_ray, facing), dtype=bool)
+                lit &= ~np.array(self.reference.occluders.ray_test(shadow_ray, facing), dtype=bool)
             return reflected, lit
 
         return self._once(("surface", _place_of(light)[:2], shadows), found)
@@ -132,7 +132,7 @@ def _place_of(light: Light) -> tuple[Any, ...]:
 
 
 def view_of(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     pixels: Index | None = None,
     *,
     rays_per_side: int = 0,
@@ -146,17 +146,17 @@ def view_of(
     moves all rays on the film, to the right and down [pixels]; `zoom`: factor on the distance of all rays from the
     middle of the film, before they are moved.
     """
-    size = truth.width, truth.height
+    size = reference.width, reference.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
     positions, middle = _positions(pixel_centres(size)[pixels], rays_per_side), 0.5 * np.array(size)
     positions = middle + zoom * (positions - middle) + np.asarray(offset)
-    rays = replace(truth, direction=film_directions(truth.scene.sensors()[0], positions, size))
-    shapes, hits = read_shapes(truth.occluders), surface_hits(rays)
+    rays = replace(reference, direction=film_directions(reference.scene.sensors()[0], positions, size))
+    shapes, hits = read_shapes(reference.occluders), surface_hits(rays)
     distance = exact_distance(rays, hits.interaction, hits.distance, shapes)
-    length = lengths(rays, truth.origin, rays.direction, distance)
+    length = lengths(rays, reference.origin, rays.direction, distance)
     length[~np.isfinite(distance), 0] = np.inf
     owner = np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2)
-    axis = camera_matrix(truth.scene.sensors()[0])[:3, 2]
+    axis = camera_matrix(reference.scene.sensors()[0])[:3, 2]
     return View(rays, pixels, owner, axis, distance, hits.interaction, shapes, length)
 
 
@@ -199,20 +199,25 @@ def scattering_paths(
     spots fall off smoothly, besides their own edge; `ends`: distances between which rays have nodes, (rays,) each [m];
     `shadows`: false where surfaces hide nothing from the lights; `samples`: how many stand for an area light.
     """
-    truth = view.truth if lights is None else replace(view.truth, lights=tuple(lights))
+    reference = view.reference if lights is None else replace(view.reference, lights=tuple(lights))
     paths = []
-    for source in light_sources(truth, samples, radius):
-        nodes, lit = [no_places(len(truth.media) + 1, surface=False)], [no_places(len(truth.media) + 1, surface=True)]
+    for source in light_sources(reference, samples, radius):
+        nodes, lit = (
+            [no_places(len(reference.media) + 1, surface=False)],
+            [no_places(len(reference.media) + 1, surface=True)],
+        )
         for given in source.lights:
             light = _whole_within(given, blend) if blend else given
-            nowhere = not truth.media and not isinstance(truth.medium, HeightMedium)  # directional light scatters
+            nowhere = not reference.media and not isinstance(
+                reference.medium, HeightMedium
+            )  # directional light scatters
             if airlight and not (isinstance(light, DirectionalLight) and nowhere):
                 reach = view.reach(light, shadows=shadows, area=source.area)
                 make: Any = parallel_nodes if isinstance(light, DirectionalLight) else point_nodes
-                nodes.append(_edged(make(truth, light, reach, ends), light, source, blend))
-            if surface and truth.occluders.shapes():
+                nodes.append(_edged(make(reference, light, reach, ends), light, source, blend))
+            if surface and reference.occluders.shapes():
                 reflected, visible = view.reflected(light, shadows=shadows)
-                points = surface_points(truth, light, view.distance, reflected, visible)
+                points = surface_points(reference, light, view.distance, reflected, visible)
                 lit.append(_edged(points, light, source, blend))
         paths.append(LightPaths(source.name, np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
     return tuple(paths)
@@ -229,12 +234,12 @@ class Source:
     area: ReferenceAreaLight | None = None  #: that has this extent in the scene
 
 
-def light_sources(truth: ReferenceScene, samples: int = SAMPLES, radius: float = 0.0) -> list[Source]:
+def light_sources(reference: ReferenceScene, samples: int = SAMPLES, radius: float = 0.0) -> list[Source]:
     """Return the lights of a scene: point and spot lights, directional ones, then area lights.
 
     The parameters are those of `scattering_paths`.
     """
-    emitters = truth.scene.emitters()
+    emitters = reference.scene.emitters()
     far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
     near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
     plan = PointPlan(most=samples)
@@ -242,9 +247,11 @@ def light_sources(truth: ReferenceScene, samples: int = SAMPLES, radius: float =
         _as_sphere(name, light, plan, radius)
         if radius > 0 and light.axis is None
         else Source(name, light.intensity, (light,))
-        for name, light in zip(near_names, truth.lights, strict=True)
+        for name, light in zip(near_names, reference.lights, strict=True)
     ]
-    far = [Source(name, light.irradiance, (light,)) for name, light in zip(far_names, truth.directional, strict=True)]
+    far = [
+        Source(name, light.irradiance, (light,)) for name, light in zip(far_names, reference.directional, strict=True)
+    ]
     wide = [
         Source(
             light.name,
@@ -253,7 +260,7 @@ def light_sources(truth: ReferenceScene, samples: int = SAMPLES, radius: float =
             light.centre if light.kind == "sphere" else None,
             light,
         )
-        for number, light in enumerate(truth.area)
+        for number, light in enumerate(reference.area)
     ]
     return [*near, *far, *wide]
 

@@ -64,18 +64,18 @@ def bench_kernels(
     total = len(ladders) * len(phases)
     costs: list[Cost] = []
     for number, (phase, g) in enumerate(phases):
-        truth, timed = wide_rays(ERROR_RAYS, phase, g), wide_rays(RAYS, phase, g, truth=False)
+        reference, timed = wide_rays(ERROR_RAYS, phase, g), wide_rays(RAYS, phase, g, reference=False)
         for done, (family, default, sizes) in enumerate(ladders):
             if progress is not None:
                 progress(number * len(ladders) + done, total, f"{family}, {phase}")
             for size in sizes if number == 0 else (default,):
-                cost = measure(family, size, truth=truth, timed=timed)
+                cost = measure(family, size, reference=reference, timed=timed)
                 if cost["refused"] is None or size == default:  # a size that the kernel does not have is left out
                     costs.append(cost)
     return costs
 
 
-def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, seconds: float = 0.3) -> Cost:
+def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, seconds: float = 0.3) -> Cost:
     """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function.
 
     Returns
@@ -86,7 +86,7 @@ def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, second
         quartiles `low` and `high` and its `repetitions`; `median`, `p99` and `max` of the relative errors in float32,
         and how many are `nonfinite`; or in `refused` the kernel's words.
     """
-    name, phase, g = sized(family, size), truth.phase[0], float(truth.g[0])
+    name, phase, g = sized(family, size), reference.phase[0], float(reference.g[0])
     function = find_kernel(name)
     cost: Cost = {"kernel": name, "family": family, "size": size, "phase": phase, "g": g, "rays": 0, "nonfinite": 0}
     cost |= dict.fromkeys(("device", "wall", "median", "p99", "max", "refused"))
@@ -94,11 +94,11 @@ def measure(family: str, size: int | None, *, truth: Cases, timed: Cases, second
     if size is not None and family in KERNELS and next(iter(KERNELS[family].parameters), None) == "steps":
         rays //= max(1, size // _MOST_STEPS)
     try:
-        J = np.array(_frozen(function, truth)(), dtype=np.float64)
+        J = np.array(_frozen(function, reference)(), dtype=np.float64)
         device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
     except (InputError, RealtimeInputError) as reason:
         return cost | {"refused": str(reason)}
-    error = relative_error(J, np.asarray(truth.value), "single")
+    error = relative_error(J, np.asarray(reference.value), "single")
     finite = np.isfinite(error)
     median, p99, largest = np.percentile(error[finite], [50, 99, 100]).tolist() if finite.any() else [None] * 3
     errors = {"median": median, "p99": p99, "max": largest, "nonfinite": int(np.sum(~finite))}

@@ -55,8 +55,8 @@ _SMALLEST = {"single": 2.0**-126, "double": 2.0**-1022}
 
 #: Of one group of rays, by name: how many `rays` the kernel did not refuse and how many it `refused`; `median`, `p99`,
 #: `max` and `mean` of the relative errors that are finite [1], None where there is none; how many values are `nan`,
-#: `infinite` where the truth is finite, or `negative`; and the `worst` ray, that of the largest error or the first that
-#: is not finite, as a line of CSV.
+#: `infinite` where the reference is finite, or `negative`; and the `worst` ray, that of the largest error or the first
+#: that is not finite, as a line of CSV.
 Errors = Mapping[str, Any]
 
 

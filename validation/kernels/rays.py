@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rays that kernels are tried on: quasi-random, exact float32 numbers, with the truth from `analytic`.
+"""Rays that kernels are tried on: quasi-random, exact float32 numbers, with the reference from `analytic`.
 
 Three sets, each the same on every machine:
 
@@ -30,7 +30,9 @@ Array = NDArray[np.float64]
 COLUMNS = ("tag", "phase", "g", "t", "h", "x0", "x1", "sigma_t", "value")
 
 _SEED = 20101
-_G = np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)  # few, since the truth takes one g at a time
+_G = (
+    np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)
+)  # few, since the reference takes one g at a time
 _LARGEST_SOBOL = 1 << 20
 
 
@@ -79,7 +81,7 @@ def slivers(count: int = 8192) -> Cases:
     return with_reference(table(phase, zero, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
 
 
-def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bool = True) -> Cases:
+def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, reference: bool = True) -> Cases:
     """Return the set W (see the module) for one phase function, with the extinction 1/m, and with the true J or not."""
     u = _sobol(count, 3)
     distance = _log(u[:, 0], 1e-4, 60.0)
@@ -90,7 +92,7 @@ def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, truth: bo
     g_exact = np.full(count, float(np.float32(g)))
     zeros, ones = np.zeros(count), np.ones(count)
     cases = table(names, g_exact, foot=foot, height=height, x0=zeros, x1=x1, sigma_t=ones, tags=np.full(count, "wide"))
-    return with_reference(cases) if truth else cases
+    return with_reference(cases) if reference else cases
 
 
 def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t: Array, tags) -> Cases:

@@ -308,10 +308,10 @@ def _blocks(some: Bools) -> slice:
     return slice(places[0] // BLOCK * BLOCK, (places[-1] // BLOCK + 1) * BLOCK)
 
 
-def _pixel_of(truth: ReferenceScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
+def _pixel_of(reference: ReferenceScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
     """Return row and column of the pixels that show points, and whether these lie in the image."""
-    size = truth.width, truth.height
-    place = np.floor(film_positions(truth.scene.sensors()[0], points - truth.origin, size))
+    size = reference.width, reference.height
+    place = np.floor(film_positions(reference.scene.sensors()[0], points - reference.origin, size))
     inside = np.all((place >= 0) & (place < np.array(size)), axis=1)  # behind the camera it is NaN
     column, row = np.where(inside[:, None], place, 0).astype(np.int64).T
     return row, column, inside

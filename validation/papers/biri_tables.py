@@ -63,8 +63,8 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         size, compared = _scaled(full, scale), _scaled(_COMPARED, scale)
         scene = read_scene(load_scene(scene_name, size).scene)
         small = load_scene(scene_name, compared).scene
-        truth = reference_image(small)
-        whole = truth.airlight + truth.surface
+        reference = reference_image(small)
+        whole = reference.airlight + reference.surface
         chosen = as_published("taylor", white=float(np.quantile(whole.max(axis=-1), 0.999)), cone=cone)
         frame = render_frame(prepared(read_scene(small), chosen))
         errors.append(error_metrics(whole, frame.airlight + frame.surface).p50)

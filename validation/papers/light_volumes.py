@@ -217,11 +217,11 @@ def _filter_errors(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Arra
 def _biased() -> list[float]:
     """Return for each bias the relative RMSE of the sum with depth testing to the sum with clamped depths."""
     loaded = load_scene("omni-box", _BIAS_SIZE).scene
-    scene, truth = read_scene(loaded), read_reference(loaded)
+    scene, reference = read_scene(loaded), read_reference(loaded)
     light = scene.lights[0]
     depth = render_frame(_renderer(scene, "mesh", _BIAS_MAP)).distance.astype(np.float64).ravel()
-    foot, height = foot_and_height(truth.origin, truth.direction, truth.lights[0].position)
-    sigma = float(truth.medium.sigma_t[0])
+    foot, height = foot_and_height(reference.origin, reference.direction, reference.lights[0].position)
+    sigma = float(reference.medium.sigma_t[0])
     mesh = volume_mesh(cast_shadow_map(scene.geometry, light, _BIAS_MAP), light)
 
     def summed(shown: VolumeMesh, *, clamp: bool) -> Array:

@@ -53,8 +53,8 @@ def shortcuts() -> dict[str, float]:
     """Return the errors of the polynomial, of Gamma at the vertices and of an 8-bit buffer.
 
     `near, steps`: see `_steps`. `vertex`: Gamma at the vertices, in `two-pens`. `bright, bias` and `dim, bias`: of an
-    8-bit buffer in `clutter`, over the pixels whose truth is below white, which is a quarter of the brightest airlight
-    of 99 % of the pixels, and four times as much.
+    8-bit buffer in `clutter`, over the pixels whose reference is below white, which is a quarter of the brightest
+    airlight of 99 % of the pixels, and four times as much.
     """
     true = _reference("clutter")
     brightest = float(np.percentile(true.max(axis=2), 99))
@@ -95,9 +95,9 @@ def _lamp_in_fog(depth: float) -> dict[str, Any]:
 
 
 def _close_to_lamp(scene: Any) -> NDArray[np.bool_]:
-    truth = read_reference(scene)
-    foot, height = foot_and_height(truth.origin, truth.direction, truth.lights[0].position)
-    return (np.arctan2(height, foot) < np.radians(10)).reshape(truth.height, truth.width)
+    reference = read_reference(scene)
+    foot, height = foot_and_height(reference.origin, reference.direction, reference.lights[0].position)
+    return (np.arctan2(height, foot) < np.radians(10)).reshape(reference.height, reference.width)
 
 
 def _error(scene: str, values: Mapping[str, Any]) -> Metrics:

@@ -118,8 +118,8 @@ def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[s
 def shafts_reference(size: tuple[int, int]) -> Reference:
     """Return the quadrature of the scene and its penumbra."""
     loaded = load_scene(SCENE, size).scene
-    truth = reference_image(loaded)
-    image = np.asarray(truth.airlight + truth.surface, dtype=np.float64)
+    reference = reference_image(loaded)
+    image = np.asarray(reference.airlight + reference.surface, dtype=np.float64)
     return Reference(image, penumbra(read_scene(loaded)))
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Changes of a scene by name: its camera, lights and media, as `--change NAME=VALUE` and the live view make them.
 
-A change goes into Mitsuba's own scene, so the methods and the truth read the same. The names:
+A change goes into Mitsuba's own scene, so the methods and the reference read the same. The names:
 
 | name | value |
 | --- | --- |

@@ -100,7 +100,7 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
 
     Each value is the mean of the function under the hat of its cosine: the table has the same mean, 1, is nowhere below
     0, and blurs a peak by a cell, which beside the forward direction is the angle acos(1 - 2/(values - 1)), 2.6 degrees
-    for 2001 values and 0.8 for 20001. Mitsuba, truth and methods then agree on the table, blur included.
+    for 2001 values and 0.8 for 20001. Mitsuba, reference and methods then agree on the table, blur included.
 
     The words are those of `analytic.phase.phase_from_words`, the values lie at regularly spaced cosines; the reference
     of a scene takes a time in proportion to their number.

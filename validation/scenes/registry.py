@@ -81,7 +81,9 @@ class SceneRecord:
     published: str  #: the published figure that the scene stands for
     animation: Animation = field(default_factory=Animation)  #: what moves in it
     varying: bool = False  #: whether its fog is height fog or a grid, which have no one extinction
-    clouds: bool = False  #: whether light is scattered many times: then `cloud-paths` is its truth, and few methods fit
+    clouds: bool = (
+        False  #: whether light is scattered many times: then `cloud-paths` is its reference, and few methods fit
+    )
     digest: str = ""  #: of its description
     many: bool = False  #: whether it has many lights, of which methods are to choose
 

@@ -156,10 +156,11 @@ def compare_statistics(
     """Test two images against each other (derivations: see the module).
 
     Valid for pixels whose beam keeps away from the light: where it holds the light the variance is infinite and no test
-    means anything (the 95 % interval of Pareto's law with exponent 3/2 holds the truth in 80 % of cases), so mask them.
-    Skewed estimates need many batches: with 32, each one log-normal number of logarithmic deviation 1, 6 % of values
-    exceed the 1 % level, as a batch without a rare large value is too low and looks too sure at once. `exceeding_p` and
-    `uniformity_p` show it; the interval of the image keeps its 95 % (tests/validation/statistics/test_rates.py).
+    means anything (the 95 % interval of Pareto's law with exponent 3/2 holds the true value in 80 % of cases), so mask
+    them. Skewed estimates need many batches: with 32, each one log-normal number of logarithmic deviation 1, 6 % of
+    values exceed the 1 % level, as a batch without a rare large value is too low and looks too sure at once.
+    `exceeding_p` and `uniformity_p` show it; the interval of the image keeps its 95 %
+    (tests/validation/statistics/test_rates.py).
 
     At least one of two independent estimates has a standard error. Pixels that the mask leaves out, (height, width) of
     truth values, or that are not finite in either mean are not compared: `error_metrics` counts the latter, and batch

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""How far a number may move before that means something: the noise of errors and of times.
 
-**Errors.** Methods and truth draw no random numbers: on one machine, with one set of versions, a second run gives the
-same digits (seen in every pair of reports of 2026-11-21: no error differed). Another processor, another width of its
-vectors, another LLVM or CUDA fuse and order the same float32 operations differently. That moves an error e by
+**Errors.** Methods and reference draw no random numbers: on one machine, with one set of versions, a second run gives
+the same digits (seen in every pair of reports of 2026-11-21: no error differed). Another processor, another width of
+its vectors, another LLVM or CUDA fuse and order the same float32 operations differently. That moves an error e by
 
     |e' - e| <= band e + floor
 

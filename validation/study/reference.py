@@ -96,12 +96,12 @@ def cell_reference(loaded: LoadedScene) -> Reference:
 
 def sampled_reference(scene) -> dict[str, Array]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
-    truth = read_reference(scene)
-    check_camera(truth)
-    count = truth.height * truth.width
+    reference = read_reference(scene)
+    check_camera(reference)
+    count = reference.height * reference.width
     mask = np.zeros(count, dtype=bool)
     mask[np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _SHARE)]] = True
-    some = replace(truth, direction=truth.direction[mask])
+    some = replace(reference, direction=reference.direction[mask])
     check_rays(some, surface_hits(some).distance)
     rays = ray_values(some, plan=_PLAN)
     airlight, bound = np.zeros((count, 3)), np.zeros((count, 3))
@@ -109,5 +109,5 @@ def sampled_reference(scene) -> dict[str, Array]:
     bound[mask] = rays.bound + _STANDARD_ERRORS * standard_error(rays.replicates)[:, :3]
     if not (np.isfinite(airlight).all() and np.isfinite(bound).all()):
         raise InputError("the reference is not finite in some pixels: a light may lie on a ray; move it")
-    shape = truth.height, truth.width
+    shape = reference.height, reference.width
     return {"airlight": airlight.reshape(*shape, 3), "bound": bound.reshape(*shape, 3), "mask": mask.reshape(shape)}

@@ -77,7 +77,7 @@ class SceneStudy:
         return kept_reference(self.loaded.scene)
 
     @property
-    def truth(self) -> ReferenceImage:
+    def reference(self) -> ReferenceImage:
         """The quadrature reference at pixel centres."""
         return self.kept_reference[0]
 
@@ -117,7 +117,7 @@ class SceneStudy:
 
     def reference_of(self, pixel: str) -> ReferenceImage:
         """Return the quadrature reference at pixel centres, or its means over their areas: 'centre' or 'area'."""
-        return self.truth if pixel == "centre" else reference_image(self.loaded.scene, pixel=pixel)
+        return self.reference if pixel == "centre" else reference_image(self.loaded.scene, pixel=pixel)
 
     def cell(self, chosen: Configuration) -> Cell:
         """Return the cell of a configuration."""
@@ -191,7 +191,7 @@ def study_scene(
     So many `workers` compute HDR-FLIP at once, each on one processor.
     """
     progress("reference")
-    truth, kept = study.kept_reference
+    reference, kept = study.kept_reference
     made = Result({}, {}, kept.made, round(kept.spent.seconds, 3), kept.loaded)
     progress("checks")
     checks = cached_result(_checks_key(study), lambda: (plain(check_reference(study, spread=spread)), {}))
@@ -208,7 +208,7 @@ def study_scene(
     results = (made, checks, multiple, *(result for row in rows for result in row.results))
     seconds = {"reference": made.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
     seconds["methods"] = round(sum(result.seconds for result in results[3:]), 3)
-    return SceneResult(study, truth, checks.data, multiple.data, tuple(rows), seconds, results)
+    return SceneResult(study, reference, checks.data, multiple.data, tuple(rows), seconds, results)
 
 
 def configurations_for(features: SceneFeatures, configurations: Sequence[Configuration]) -> tuple[Configuration, ...]:
@@ -260,7 +260,7 @@ def _cell_key(study: SceneStudy, chosen: Configuration) -> str:
 
 def _measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> Computed:
     """Return the row and the image of a configuration."""
-    row, frame = run(study.cell(chosen), study.scene, of_image(study.truth), timed_scene=study.timed, apart=apart)
+    row, frame = run(study.cell(chosen), study.scene, of_image(study.reference), timed_scene=study.timed, apart=apart)
     if frame is None:
         return plain(row), {}
     return plain(row), {"airlight": frame.airlight, "surface": frame.surface, "depth": frame.distance, **frame.extra}
@@ -270,7 +270,7 @@ def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: M
     if chosen in ended:
         row = plain(cell_row(study.cell(chosen), status="refused", reason=ended[chosen]))
         return Judged(row, results=(Result(row, {}, time.time(), 0.0, False),))
-    _ = study.truth  # loaded or computed now: it is no part of the time of a configuration
+    _ = study.reference  # loaded or computed now: it is no part of the time of a configuration
     # A fault of the user's method may have gone by the next run.
     worth = (lambda row: row["status"] == "done") if chosen.own else (lambda row: True)
     result = cached_result(_cell_key(study, chosen), partial(_measured, study, chosen, apart), worth=worth)
@@ -279,8 +279,8 @@ def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: M
     airlight, surface, distance = (result.arrays[name] for name in ("airlight", "surface", "depth"))
     extra = {name: array for name, array in result.arrays.items() if name not in ("airlight", "surface", "depth")}
     image = layered_frame(study.name, chosen, Frame(airlight, surface, distance, extra))
-    whole = study.truth.airlight + study.truth.surface if study.study.wants_flip(chosen) else None
-    return Judged(result.data, image, study.truth.airlight, whole, (result,))
+    whole = study.reference.airlight + study.reference.surface if study.study.wants_flip(chosen) else None
+    return Judged(result.data, image, study.reference.airlight, whole, (result,))
 
 
 def _with_flip(judged: Judged) -> Judged:
@@ -346,11 +346,11 @@ def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
         surface_error=surface,
     )
     arrays: dict[str, Any] = {f"{_LAYER}{name}": values for name, values in layers.items()}
-    arrays["expected"], truth = judged.truth, judged.fit.truth
+    arrays["expected"], reference = judged.reference, judged.fit.reference
     if judged.expected == TOTAL:
-        arrays["whole"] = judged.truth
-    elif "surface" in layers or not np.any(truth.surface > 0):
-        arrays["whole"] = truth.airlight + truth.surface
+        arrays["whole"] = judged.reference
+    elif "surface" in layers or not np.any(reference.surface > 0):
+        arrays["whole"] = reference.airlight + reference.surface
     times = {} if timed is None else {"times": {"frame": plain(timed[0])}}
     return plain(row) | times, arrays
 

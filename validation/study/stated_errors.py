@@ -90,110 +90,110 @@ def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
     return np.concatenate([_worth_of_ends(replace(whole, direction=whole.direction[part])) for part in parts])
 
 
-def _worth_of_ends(truth: ReferenceScene) -> Array:
-    """Return what the uncertain ends of the lit intervals of all rays of `truth` are worth, (rays, 3)."""
-    distance = surface_hits(truth).distance
+def _worth_of_ends(reference: ReferenceScene) -> Array:
+    """Return what the uncertain ends of the lit intervals of all rays of `reference` are worth, (rays, 3)."""
+    distance = surface_hits(reference).distance
     worth = np.zeros((len(distance), 3))
-    sources: list[tuple[Any, ...]] = [(light, _angles_about, _from_place) for light in truth.lights]
-    sources += [(light, _equal_steps, _from_infinity) for light in truth.directional]
-    ends, growth = _ends(truth, distance)
+    sources: list[tuple[Any, ...]] = [(light, _angles_about, _from_place) for light in reference.lights]
+    sources += [(light, _equal_steps, _from_infinity) for light in reference.directional]
+    ends, growth = _ends(reference, distance)
     for light, places_of, incident in sources:
-        places = np.concatenate([ends, places_of(truth, light, distance)])
+        places = np.concatenate([ends, places_of(reference, light, distance)])
         uncertain = np.concatenate([growth, np.ones_like(places[len(ends) :])]).T
         x = np.clip(places, 0, distance).T
         ray, column = np.nonzero(np.isfinite(x))
         uncertain, x = (uncertain * x)[ray, column], x[ray, column]
-        scattered = uncertain[:, None] * _scattered(truth, partial(incident, truth, light), ray, x, distance)
+        scattered = uncertain[:, None] * _scattered(reference, partial(incident, reference, light), ray, x, distance)
         largest = np.zeros_like(worth)
         np.maximum.at(largest, ray, scattered)
         worth += largest
     return _BETWEEN * END * worth
 
 
-def _ends(truth: ReferenceScene, distance: Array) -> tuple[Array, Array]:
+def _ends(reference: ReferenceScene, distance: Array) -> tuple[Array, Array]:
     """Return distances along rays [m], and what divides their certainty, 1/|c| [1], (places, rays) each.
 
     They are those of the ends of rays, the middles of segments in media and between them, and where rays cross bounds.
     """
     places = [np.zeros_like(distance), distance]
-    if truth.media:
-        segments = camera_segments(truth, distance)
+    if reference.media:
+        segments = camera_segments(reference, distance)
         places += list(0.5 * (segments.start + segments.end))
     growth = [np.ones_like(distance)] * len(places)
-    for medium in truth.media:
-        enter, leave = crossings(medium.bounds, truth.origin, truth.direction)
+    for medium in reference.media:
+        enter, leave = crossings(medium.bounds, reference.origin, reference.direction)
         for x in (enter, leave):
             met = (enter < leave) & (x > 0) & (x < distance)
-            points = truth.origin + np.where(met, x, 0)[:, None] * truth.direction
-            cosine = np.abs(np.sum(normals_at(medium.bounds, points) * truth.direction, axis=1))
+            points = reference.origin + np.where(met, x, 0)[:, None] * reference.direction
+            cosine = np.abs(np.sum(normals_at(medium.bounds, points) * reference.direction, axis=1))
             places.append(np.where(met, x, np.inf))
             growth.append(1 / np.where(met, np.maximum(cosine, END), 1))  # below it nothing is known of x
     return np.stack(places), np.stack(growth)
 
 
-def _angles_about(truth: ReferenceScene, light: ReferenceLight, distance: Array) -> Array:
+def _angles_about(reference: ReferenceScene, light: ReferenceLight, distance: Array) -> Array:
     """Return distances at equal angles about a light, (places, rays) [m]."""
-    toward = light.position - truth.origin
-    foot = truth.direction @ toward
-    height = np.linalg.norm(toward - foot[:, None] * truth.direction, axis=1)
+    toward = light.position - reference.origin
+    foot = reference.direction @ toward
+    height = np.linalg.norm(toward - foot[:, None] * reference.direction, axis=1)
     first, last = np.arctan2(-foot, height), np.arctan2(distance - foot, height)
     angle = first + np.linspace(0, 1, _SAMPLES)[:, None] * (last - first)
     return np.where(angle < np.pi / 2 - 1e-6, foot + height * np.tan(angle), np.inf)
 
 
-def _equal_steps(truth: ReferenceScene, light: DirectionalLight, distance: Array) -> Array:
+def _equal_steps(reference: ReferenceScene, light: DirectionalLight, distance: Array) -> Array:
     """Return distances at equal steps where rays scatter, (places, rays) [m]."""
-    low, high = scattering_range(camera_segments(truth, distance))
+    low, high = scattering_range(camera_segments(reference, distance))
     return low + np.linspace(0, 1, _SAMPLES)[:, None] * (high - low)
 
 
-def _from_place(truth: ReferenceScene, light: ReferenceLight, point: Array) -> tuple[Array, Array]:
+def _from_place(reference: ReferenceScene, light: ReferenceLight, point: Array) -> tuple[Array, Array]:
     """Return the direction in which light arrives at points, and how much of it [W/m^2], (n, 3)."""
     leg = point - light.position
     r = np.linalg.norm(leg, axis=1)
     leg /= r[:, None]
-    depth = optical_depth(truth, light.position, leg, np.zeros(len(r)), r)
+    depth = optical_depth(reference, light.position, leg, np.zeros(len(r)), r)
     return leg, light.intensity / (r * r)[:, None] * np.exp(-depth)
 
 
-def _from_infinity(truth: ReferenceScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
+def _from_infinity(reference: ReferenceScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
     """As `_from_place`; nothing is taken off on the way, which is an upper bound."""
     return np.broadcast_to(light.direction, point.shape), np.broadcast_to(light.irradiance, point.shape)
 
 
 def _scattered(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     incident: Callable[[Array], tuple[Array, Array]],
     ray: NDArray[np.int64],
     x: Array,
     distance: Array,
 ) -> Array:
     """Return what a metre of rays scatters at distances x in the full light of one light, (n, 3) [W/(m^3 sr)]."""
-    direction = truth.direction[ray]
-    leg, arriving = incident(truth.origin + x[:, None] * direction)
-    from_camera = optical_depth(truth, truth.origin, direction, np.zeros(len(x)), x)
+    direction = reference.direction[ray]
+    leg, arriving = incident(reference.origin + x[:, None] * direction)
+    from_camera = optical_depth(reference, reference.origin, direction, np.zeros(len(x)), x)
     kept = arriving * np.exp(-from_camera) / (4 * np.pi)
     total = np.zeros_like(kept)
-    for medium, inside in _media(truth, ray, x, distance):
+    for medium, inside in _media(reference, ray, x, distance):
         phase = medium.phase(np.clip(np.sum(leg * -direction, axis=1), -1, 1))
         total += np.where(inside, phase, 0)[:, None] * medium.albedo * medium.sigma_t * kept
     return total
 
 
 def _media(
-    truth: ReferenceScene, ray: NDArray[np.int64], x: Array, distance: Array
+    reference: ReferenceScene, ray: NDArray[np.int64], x: Array, distance: Array
 ) -> list[tuple[ReferenceMedium, Any]]:
     """Return media and which places are in them; a place at a bound is on either side of it."""
-    if not truth.media:
-        return [(homogeneous_around(truth), np.ones(len(x), dtype=bool))]
-    segments = camera_segments(truth, distance)
+    if not reference.media:
+        return [(homogeneous_around(reference), np.ones(len(x), dtype=bool))]
+    segments = camera_segments(reference, distance)
     slack = END * x
     inside = [
         (number[ray], (x >= start[ray] - slack) & (x <= end[ray] + slack) & (start[ray] < end[ray]))
         for start, end, number in zip(segments.start, segments.end, segments.medium)
     ]
-    numbers = [AMBIENT, *range(len(truth.media))]
-    media = [homogeneous_around(truth), *truth.media]
+    numbers = [AMBIENT, *range(len(reference.media))]
+    media = [homogeneous_around(reference), *reference.media]
     return [
         (medium, np.any([which & (of == number) for of, which in inside], axis=0))
         for number, medium in zip(numbers, media, strict=True)

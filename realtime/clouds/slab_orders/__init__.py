@@ -2,7 +2,7 @@
 """The light of a homogeneous slab under a beam, by order of scattering, with the moments of its displacement.
 
 A deterministic computation in NumPy and SciPy, float64: it makes the grid of the canonical transport of Bouthors 2008
-and runs nowhere in a frame. The truth that checks it is a walk of photons, on the other side
+and runs nowhere in a frame. The reference that checks it is a walk of photons, on the other side
 (`reference/monte_carlo/slab_walk/`).
 
 Read in this order:

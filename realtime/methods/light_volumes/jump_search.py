@@ -3,7 +3,7 @@
 
 As published (Billeter, Sintorn, Assarsson 2010), a silhouette of what the light sees is joined to what lies behind it
 by triangles across one texel: next to its caster the shadow begins at the caster's last sample, far behind it at the
-first sample of the background. What joins them in truth is upright, in a plane through the light, and stands somewhere
+first sample of the background. What joins them in fact is upright, in a plane through the light, and stands somewhere
 between the two samples. The same error stands along the whole ray, so it does not average out.
 
 Here the place is found. On every side of a texel whose two heights differ by more than `_JUMP` of the larger one, rays

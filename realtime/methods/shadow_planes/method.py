@@ -99,7 +99,7 @@ class ShadowPlanes(Method):
     ambient: float = parameter(
         0.0,
         "radiance of a constant light field in the medium, the paper's stand-in for multiple scattering, which adds "
-        "albedo ambient (1 - exp(-sigma_t x)); the truth has none",
+        "albedo ambient (1 - exp(-sigma_t x)); the reference has none",
         least=0,
         unit="W/(m^2 sr)",
     )

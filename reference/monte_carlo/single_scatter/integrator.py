@@ -27,19 +27,19 @@ from reference.scene.read import ReferenceScene, whole_scene
 _RAYS = 1 << 20  # camera rays in one kernel
 
 
-def single_scatter_batch(truth: ReferenceScene, seed: int, samples: int) -> Batches:
+def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> Batches:
     """Trace one batch along the pixel-centre rays, from the pinhole.
 
-    `truth`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for
+    `reference`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for
     each ray, light and medium, each from a point of its own of a light with extent, at most 256. Returns Batches:
     airlight and surface of every pixel [W/(m^2 sr)]. The surface is sampled under lights with extent and a sky
     alone: without these all batches agree on it.
     """
     check_samples(samples)
-    medium = truth.scene.sensors()[0].get_medium()
-    task = read_task(whole_scene(truth), medium, samples)
+    medium = reference.scene.sensors()[0].get_medium()
+    task = read_task(whole_scene(reference), medium, samples)
     sampler = mi.load_dict({"type": "independent"})
-    pixels = truth.width * truth.height
+    pixels = reference.width * reference.height
     chunks = -(-pixels // _RAYS)
     mean = np.empty((2, pixels, 3))
     for number in range(chunks):
@@ -47,7 +47,7 @@ def single_scatter_batch(truth: ReferenceScene, seed: int, samples: int) -> Batc
         count = chunk.stop - chunk.start
         # Seeds count up from batch to batch and from chunk to chunk: no two streams share one.
         sampler.seed((seed * chunks + number) % 2**32, count)
-        ray = double_ray(mi.Point3d(*(float(c) for c in truth.origin)), mi.Vector3d(truth.direction[chunk].T))
+        ray = double_ray(mi.Point3d(*(float(c) for c in reference.origin)), mi.Vector3d(reference.direction[chunk].T))
         layers = ray_light(task, sampler, ray, medium, dr.full(mi.Bool, True, count))
         dr.eval(layers)
         for layer, radiance in enumerate(layers):

@@ -47,16 +47,16 @@ _VALUES = ("sigma_t.value.value", "albedo.value.value")  # what decides the numb
 
 
 def volpath_batch(
-    truth: ReferenceScene, seed: int, samples: int, *, max_depth: int = 2, counts: Counts | None = None
+    reference: ReferenceScene, seed: int, samples: int, *, max_depth: int = 2, counts: Counts | None = None
 ) -> Batches:
     """Trace one batch.
 
-    `truth`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at most
-    256; `max_depth`: most edges of a path: 2 is one scattering. With more, `airlight` is the light that was scattered
-    by the medium alone, any number of times up to max_depth - 1, and `surface` all other light: what met a surface at
-    least once. `counts`: samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by default.
-    Raises InputError for a scene of which Mitsuba does not know how large it is, under a directional light. Raises
-    ValueError if `samples` or `max_depth` is out of range, or `counts` come with another `max_depth` than 2.
+    `reference`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at
+    most 256; `max_depth`: most edges of a path: 2 is one scattering. With more, `airlight` is the light that was
+    scattered by the medium alone, any number of times up to max_depth - 1, and `surface` all other light: what met a
+    surface at least once. `counts`: samples of each pixel, (layers, pixels), for `max_depth` 2; all have `samples` by
+    default. Raises InputError for a scene of which Mitsuba does not know how large it is, under a directional light.
+    Raises ValueError if `samples` or `max_depth` is out of range, or `counts` come with another `max_depth` than 2.
 
     Batches of one seed but another `max_depth` are not independent: their airlight paths begin alike, so that the
     difference of the two has less spread than either.
@@ -66,38 +66,40 @@ def volpath_batch(
         raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
     if counts is not None and max_depth != 2:
         raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
-    in_air, on_surface = np.full((2, truth.width * truth.height), samples) if counts is None else counts
-    far = truth.directional or truth.sky is not None
-    if far and not truth.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
+    in_air, on_surface = np.full((2, reference.width * reference.height), samples) if counts is None else counts
+    far = reference.directional or reference.sky is not None
+    if far and not reference.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
         raise InputError("volpath: the scene's bounding box is not valid, so lights from infinity start within it")
-    _check_far(truth)
-    hidden = {"hide_emitters": True} if truth.is_sampled else {}
-    truth = replace(truth, scene=whole_scene(truth))
+    _check_far(reference)
+    hidden = {"hide_emitters": True} if reference.is_sampled else {}
+    reference = replace(reference, scene=whole_scene(reference))
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
-    with black_surfaces(truth.occluders):
-        airlight = trace(truth, integrator, 2 * seed, in_air)
+    with black_surfaces(reference.occluders):
+        airlight = trace(reference, integrator, 2 * seed, in_air)
     surface = np.zeros_like(airlight)
-    if truth.occluders.shapes() and max_depth == 2:
-        surface = trace(truth, integrator, 2 * seed + 1, on_surface, scattering=False)
-    elif truth.occluders.shapes():
+    if reference.occluders.shapes() and max_depth == 2:
+        surface = trace(reference, integrator, 2 * seed + 1, on_surface, scattering=False)
+    elif reference.occluders.shapes():
         # The same paths once more, now with light from surfaces; the difference is what these add.
-        surface = trace(truth, integrator, 2 * seed, in_air) - airlight
+        surface = trace(reference, integrator, 2 * seed, in_air) - airlight
     return single_batch(seed, samples, np.stack([airlight, surface]))
 
 
-def _check_far(truth: ReferenceScene) -> None:
+def _check_far(reference: ReferenceScene) -> None:
     """Refuse fog whose light paths from infinity Mitsuba would cut: they are twice the radius of all shapes long.
 
     Those of a sky come from all directions: 60 degrees from the zenith they must leave height fog, and lower ones that
     are cut miss its thin upper part.
     """
-    medium, radius = truth.medium, float(truth.scene.bbox().bounding_sphere().radius)
-    rises = [float(-sun.direction @ medium.up) for sun in truth.directional] if isinstance(medium, HeightMedium) else []
+    medium, radius = reference.medium, float(reference.scene.bbox().bounding_sphere().radius)
+    rises = (
+        [float(-sun.direction @ medium.up) for sun in reference.directional] if isinstance(medium, HeightMedium) else []
+    )
     needed = 0.0
     if isinstance(medium, HeightMedium):
-        slowest = min(rises + [0.5] * (truth.sky is not None), default=np.inf)
+        slowest = min(rises + [0.5] * (reference.sky is not None), default=np.inf)
         needed = 0.5 * (medium.cap - medium.floor) / slowest
-    if isinstance(medium, GridMedium) and (truth.directional or truth.sky is not None):
+    if isinstance(medium, GridMedium) and (reference.directional or reference.sky is not None):
         needed = 0.5 * float(np.linalg.norm(medium.high - medium.low))
     if radius < needed:
         raise InputError(
@@ -120,22 +122,22 @@ def black_surfaces(scene) -> Iterator[None]:
             shape.set_bsdf(bsdf)
 
 
-def trace(truth: ReferenceScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
+def trace(reference: ReferenceScene, integrator, seed: int, counts: Counts, *, scattering: bool = True) -> Array:
     """Return the mean radiance of every pixel, (pixels, 3) [W/(m^2 sr)].
 
-    `truth`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of each pixel, (pixels,);
-    `scattering`: whether media scatter.
+    `reference`: the scene; `integrator`: of Mitsuba; `seed`: of the whole image; `counts`: paths of each pixel,
+    (pixels,); `scattering`: whether media scatter.
     """
     image = np.zeros((len(counts), 3))
     parts = _parts(counts)
-    extinctions = np.stack([medium.largest for medium in (truth.medium, *truth.media)], axis=1)
+    extinctions = np.stack([medium.largest for medium in (reference.medium, *reference.media)], axis=1)
     for number, sigma_t in enumerate(dict.fromkeys(map(tuple, extinctions))):
         channels = np.all(extinctions == sigma_t, axis=1)
-        with _grey_media(truth, int(np.argmax(channels)), scattering) as medium:
+        with _grey_media(reference, int(np.argmax(channels)), scattering) as medium:
             for place, part in enumerate(parts):
                 # Streams differ by seed; the part and the channel get seeds of their own.
                 stream = (seed * 3 + number) * len(parts) + place
-                image[part, channels] = _trace_pixels(truth, integrator, medium, part, stream, counts[part])[
+                image[part, channels] = _trace_pixels(reference, integrator, medium, part, stream, counts[part])[
                     :, channels
                 ]
     return image
@@ -148,9 +150,9 @@ def _parts(counts: Counts) -> list[slice]:
     return [slice(int(start), int(end)) for start, end in pairwise(edges)]
 
 
-def _trace_pixels(truth: ReferenceScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
+def _trace_pixels(reference: ReferenceScene, integrator, medium, pixels: slice, seed: int, counts: Counts) -> Array:
     # A kernel is compiled for how the memory lies that it reads, and NumPy's lies anywhere.
-    direction = dr.normalize(mi.Vector3f(truth.direction[pixels].T))
+    direction = dr.normalize(mi.Vector3f(reference.direction[pixels].T))
     dr.eval(direction)
     numbers = mi.UInt32(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
     pixel = dr.empty(mi.UInt32, dr.width(numbers))
@@ -158,9 +160,9 @@ def _trace_pixels(truth: ReferenceScene, integrator, medium, pixels: slice, seed
     dr.eval(pixel)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, dr.width(pixel))
-    start = mi.Point3f(*(float(c) for c in truth.origin))
+    start = mi.Point3f(*(float(c) for c in reference.origin))
     ray = mi.Ray3f(start, dr.gather(mi.Vector3f, direction, pixel))
-    radiance, _, _ = integrator.sample(truth.scene, sampler, mi.RayDifferential3f(ray), medium)
+    radiance, _, _ = integrator.sample(reference.scene, sampler, mi.RayDifferential3f(ray), medium)
     dr.eval(radiance)  # all channels at once: one after the other, each would trace the paths again
     first = np.cumsum(counts, dtype=np.int64) - counts
     sums = [np.add.reduceat(np.array(channel, dtype=np.float64), first) for channel in radiance]
@@ -168,14 +170,14 @@ def _trace_pixels(truth: ReferenceScene, integrator, medium, pixels: slice, seed
 
 
 @contextmanager
-def _grey_media(truth: ReferenceScene, channel: int, scattering: bool) -> Iterator[Any]:
+def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> Iterator[Any]:
     """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
-    if isinstance(truth.medium, ReferenceMedium) and not truth.media:
-        yield _grey_medium(truth.medium, float(truth.medium.sigma_t[channel]), scattering)
+    if isinstance(reference.medium, ReferenceMedium) and not reference.media:
+        yield _grey_medium(reference.medium, float(reference.medium.sigma_t[channel]), scattering)
         return
     own: list[tuple[Any, dict[str, Any]]] = []
     try:
-        for medium in (truth.medium, *truth.media):
+        for medium in (reference.medium, *reference.media):
             # Shapes may share a medium.
             if medium.plugin is not None and all(medium.plugin != plugin for plugin, _ in own):
                 parameters = mi.traverse(medium.plugin)
@@ -184,7 +186,7 @@ def _grey_media(truth: ReferenceScene, channel: int, scattering: bool) -> Iterat
                 own.append((medium.plugin, {key: type(parameters[key])(parameters[key]) for key in known}))
                 sigma_t = float(medium.largest[channel]) / float(parameters["scale"] or 1.0)
                 _set_values(medium.plugin, sigma_t, medium.albedo if scattering else np.zeros(3))
-        yield truth.scene.sensors()[0].get_medium()
+        yield reference.scene.sensors()[0].get_medium()
     finally:
         for plugin, values in own:
             parameters = mi.traverse(plugin)

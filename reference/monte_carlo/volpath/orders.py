@@ -28,7 +28,7 @@ def volpath_orders_batch(
     256; `sets`: names of sets of orders with their first and last order, the last `math.inf` for one without end.
     """
     check_samples(samples)
-    truth = ReferenceScene(
+    reference = ReferenceScene(
         scene=clouds.scene,
         occluders=clouds.occluders,
         width=clouds.width,
@@ -44,7 +44,7 @@ def volpath_orders_batch(
     def up_to(order: float):
         depth = -1 if math.isinf(order) else int(order) + 1
         integrator = mi.load_dict({"type": "volpath", "max_depth": depth, "rr_depth": 1 << 20})
-        return trace(truth, integrator, seed, counts)
+        return trace(reference, integrator, seed, counts)
 
     wanted = {0, math.inf} | {end for _, (first, last) in sets for end in (first - 1, last)}
     with black_surfaces(clouds.occluders):

@@ -32,7 +32,7 @@ is one sum of cos(theta) and sin(theta). From f1 and f2 at theta1 and theta1 + d
 
 which changes sign once at most, where tan(e) = f1 sin(delta) / (f1 cos(delta) - f2).
 
-What is lit of a ray, faces and cones of spots taken into account, is integrated like the lit intervals of the truth
+What is lit of a ray, faces and cones of spots taken into account, is integrated like the lit intervals of the reference
 (`reference.quadrature.stretches`): the oracle differs from that by what the shadow map leaves out, and by nothing else.
 """
 
@@ -68,7 +68,7 @@ def traced_walls(scene: Scene, shadow_maps: Sequence[ShadowMap]) -> list[NDArray
 
 
 def oracle_airlight(
-    truth: ReferenceScene,
+    reference: ReferenceScene,
     shadow_maps: Sequence[ShadowMap],
     *,
     distance: Array | None = None,
@@ -78,24 +78,24 @@ def oracle_airlight(
 
     Valid for rays that miss the lights; a ray through one has an infinite airlight, whatever hides the light beyond it.
     """
-    if truth.media:
-        raise InputError(f"medium '{truth.media[0].name}' has bounds; wanted one medium without bounds")
-    if len(shadow_maps) != len(truth.lights):
-        raise InputError(f"got {len(shadow_maps)} shadow maps for {len(truth.lights)} lights; wanted one for each")
+    if reference.media:
+        raise InputError(f"medium '{reference.media[0].name}' has bounds; wanted one medium without bounds")
+    if len(shadow_maps) != len(reference.lights):
+        raise InputError(f"got {len(shadow_maps)} shadow maps for {len(reference.lights)} lights; wanted one for each")
     if distance is None:
-        hits = surface_hits(truth)
-        distance = exact_distance(truth, hits.interaction, hits.distance)
-    total = np.zeros((len(truth.direction), 3))
-    for number, (light, shadow_map) in enumerate(zip(truth.lights, shadow_maps, strict=True)):
-        rays, ends = _rays_of(truth, light, np.reshape(distance, -1))
+        hits = surface_hits(reference)
+        distance = exact_distance(reference, hits.interaction, hits.distance)
+    total = np.zeros((len(reference.direction), 3))
+    for number, (light, shadow_map) in enumerate(zip(reference.lights, shadow_maps, strict=True)):
+        rays, ends = _rays_of(reference, light, np.reshape(distance, -1))
         lit = volume_intervals(height_field(shadow_map, walls[number] if walls else None), rays, ends)
-        total += lit_sums(truth, light, rays, lit, np.reshape(distance, -1))[0]
-    return total.reshape(truth.height, truth.width, 3)
+        total += lit_sums(reference, light, rays, lit, np.reshape(distance, -1))[0]
+    return total.reshape(reference.height, reference.width, 3)
 
 
-def _rays_of(truth: ReferenceScene, light: ReferenceLight, distance: Array) -> tuple[Rays, tuple[Array, Array]]:
+def _rays_of(reference: ReferenceScene, light: ReferenceLight, distance: Array) -> tuple[Rays, tuple[Array, Array]]:
     """Return the rays and the angles between which they can be lit: up to the surface, in the cone."""
-    rays = rays_at(truth.origin, truth.direction, light.position)
+    rays = rays_at(reference.origin, reference.direction, light.position)
     cone = cone_interval(rays, light, light.cutoff)
     return rays, (np.maximum(rays.theta(0.0), cone[0]), np.minimum(rays.theta(distance), cone[1]))
 

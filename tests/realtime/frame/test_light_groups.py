@@ -23,7 +23,7 @@ from tests.helpers.sunlit import fog_sphere, shaded
 from validation.scenes.meshes import rotation
 
 SIZE = (32, 24)
-#: Methods with what brings them close to the truth, and the relative RMSE of airlight that remains.
+#: Methods with what brings them close to the reference, and the relative RMSE of airlight that remains.
 CLOSE = {
     "ray-march": ({"steps": 600}, 1e-3),
     "shadow-planes": ({}, 1e-3),

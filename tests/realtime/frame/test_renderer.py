@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from tests.helpers.frames import frame, relative_rmse, truth
+from tests.helpers.frames import frame, reference_of, relative_rmse
 from tests.helpers.scenes import spot, tiny_scene
 
 SCENES = {
@@ -42,7 +42,7 @@ def test_integral_without_shadows_is_that_of_the_reference(variant, name, kernel
     scene = without_shadows(name)
     integral = render("unshadowed", kernel=kernel, precision="double", scene=scene).airlight
     # Kernels promise 1e-6. Sixteen nodes a panel know nothing of the kinks of a coarse phase table: 1e-3.
-    assert relative_rmse(integral, truth(scene).airlight) < (1e-3 if name == "tabulated" else 1e-6)
+    assert relative_rmse(integral, reference_of(scene).airlight) < (1e-3 if name == "tabulated" else 1e-6)
 
 
 # Uniform steps see their order later: an endless ray is 65 m long, and the light 4 m away.

@@ -22,13 +22,13 @@ def test_one_ray_is_the_frame_itself(variant, method):
 def test_the_mean_converges_to_that_over_the_pixels(variant):
     """16 rays err a quarter as much as the centre alone, by the quadrature of the means over pixels."""
     loaded = load_scene("sphere-spot", (16, 12))
-    truth = reference_image(loaded.scene, pixel="area").airlight
+    reference = reference_image(loaded.scene, pixel="area").airlight
     renderer = prepared(read_scene(loaded.scene), configuration("shadow-planes"))
     shares = []
 
     def error(samples):
         frame = render_samples(renderer, samples, shares.append)
-        return np.sqrt(np.mean((frame.airlight - truth) ** 2)) / truth.mean()
+        return np.sqrt(np.mean((frame.airlight - reference) ** 2)) / reference.mean()
 
     assert error(16) < error(1) / 4
     assert shares == [number / 16 for number in range(1, 17)]

@@ -28,17 +28,17 @@ def ball(**phase):
 
 def by_hand(scene, exponent, p):
     """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every chord by adaptive quadrature."""
-    truth = read_reference(mi.load_dict(scene))
-    light = truth.lights[0]
-    image = np.zeros(len(truth.direction))
-    for pixel, direction in enumerate(truth.direction):
-        toward = CENTRE - truth.origin
+    reference = read_reference(mi.load_dict(scene))
+    light = reference.lights[0]
+    image = np.zeros(len(reference.direction))
+    for pixel, direction in enumerate(reference.direction):
+        toward = CENTRE - reference.origin
         middle = toward @ direction
         half = RADIUS**2 - (toward @ toward - middle**2)
         if half <= 0:
             continue
         enter, leave = middle - np.sqrt(half), middle + np.sqrt(half)
-        away = light.position - truth.origin
+        away = light.position - reference.origin
         foot = away @ direction
         height = np.sqrt(away @ away - foot**2)
 
@@ -48,7 +48,7 @@ def by_hand(scene, exponent, p):
 
         image[pixel] = quad(integrand, enter, leave, epsabs=0, epsrel=1e-11)[0]
     scale = np.array([0.9, 0.4, 0.3]) * SIGMA * light.intensity / (4 * np.pi)
-    return image.reshape(truth.height, truth.width, 1) * scale
+    return image.reshape(reference.height, reference.width, 1) * scale
 
 
 def meant(x, r, foot, height, enter):

@@ -46,10 +46,10 @@ def test_a_phase_function_that_no_kernel_knows_is_taken_or_refused_in_a_line(var
         with pytest.raises(InputError, match=r"^[^\n]*phase function 'oval'[^\n]*use the kernel [^\n]*$"):
             kernel_values(kernel, (foot, height, x0, x1, 0.3), Oval())
         return
-    truth = [quad(integrand, *ray[2:], args=tuple(ray[:2]), epsrel=1e-11)[0] for ray in zip(foot, height, x0, x1)]
+    reference = [quad(integrand, *ray[2:], args=tuple(ray[:2]), epsrel=1e-11)[0] for ray in zip(foot, height, x0, x1)]
     value = kernel_values(kernel, (foot, height, x0, x1, 0.3), Oval())
     # Steps in the distance and a rule of 16 steps are coarse by design; the others are quadratures.
-    assert np.max(np.abs(value / truth - 1)) < {"uniform": 2e-3, "equiangular": 5e-3}.get(name, 2e-6)
+    assert np.max(np.abs(value / reference - 1)) < {"uniform": 2e-3, "equiangular": 5e-3}.get(name, 2e-6)
 
 
 @pytest.mark.parametrize("name", sorted(set(KERNELS) - {"uniform", "equiangular", "table"}))

@@ -97,7 +97,7 @@ def in_soft_spot(origin, direction, *, cutoff, beam, precision, kernel=exact, na
 
 
 @pytest.mark.parametrize(("cutoff", "beam"), [(40, 0.0), (20, 0.4), (60, 50), (80, 5)])
-def test_soft_spots_against_the_truth(cutoff, beam):
+def test_soft_spots_against_the_reference(cutoff, beam):
     """A ray that passes close to the axis of a narrow beam sees almost a kink: without a cut there 6e-3 was left."""
     rng = np.random.default_rng(3)
     count = 400
@@ -137,7 +137,7 @@ SOFT = ("exact", "quadrature", "quadrature-theta", "taylor", "taylor-printed", "
 def test_endless_rays_that_stay_in_the_beam_of_a_soft_spot(name):
     """The piece behind the beam is empty and at infinity: values were not finite in five of 440 random scenes.
 
-    Expected: the truth, without a weight in the beam, to what each kernel is known for. Uniform steps have no end.
+    Expected: the reference, without a weight in the beam, to what each kernel is known for. Uniform steps have no end.
     """
     rng = np.random.default_rng(7)
     count = 200

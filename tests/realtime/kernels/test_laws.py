@@ -38,7 +38,7 @@ SMALL = 1e-26  # lengths times 1024 have 1/r^2 a millionth: of what is dimmer fl
 @pytest.fixture(scope="module", params=["isotropic", "hg", "droplets"])
 def rays(request):
     if request.param == "droplets":
-        return wide_rays(256, "hg-draine:12", truth=False)
+        return wide_rays(256, "hg-draine:12", reference=False)
     rays = hard_rays(2048)
     return take(rays, np.asarray(rays.phase) == request.param)
 

@@ -59,7 +59,9 @@ def envelope_of(kernel, sizes, rays, phase, g, power):
         for n in sizes
     ]
     found, sizes = np.array(found), np.array(sizes, dtype=float)
-    counts = (found > 3e-12) & (found < 0.3)  # below, the truth and rounding count; above, nothing has converged yet
+    counts = (found > 3e-12) & (
+        found < 0.3
+    )  # below, the reference and rounding count; above, nothing has converged yet
     assert counts.sum() > 2
     return sizes[counts], np.maximum.accumulate((found / sizes**power)[counts][::-1])[::-1]
 

@@ -33,6 +33,6 @@ def test_what_the_rule_of_panels_leaves_without_rounding(name):
     f0 = e0 / scale
     width = dr.maximum(dr.asinh(e1 / scale) - dr.asinh(f0), 0)
     parts = (phase, (f0, dr.sqrt(f0 * f0 + 1)), scale, width, [sigma_t * h], None)
-    rule, truth = (np.array(panels_mean(*parts, nodes=nodes)[0]) for nodes in (PANEL_NODES, 40))
+    rule, reference = (np.array(panels_mean(*parts, nodes=nodes)[0]) for nodes in (PANEL_NODES, 40))
     long_enough = np.array(width) > 1e-6  # the difference of two asinh has lost shorter ones
-    assert np.abs(rule[long_enough] / truth[long_enough] - 1).max() < LEFT
+    assert np.abs(rule[long_enough] / reference[long_enough] - 1).max() < LEFT

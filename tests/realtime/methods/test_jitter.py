@@ -14,7 +14,7 @@ from scipy.stats import t as student
 from realtime.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.methods.registry import find_method
-from tests.helpers.frames import renderer, truth
+from tests.helpers.frames import reference_of, renderer
 from tests.helpers.scenes import spot, tiny_scene
 
 SIZE, RUNS = (16, 12), 64
@@ -46,7 +46,7 @@ def lamps():
 
 def biases(method, parameters, scene, runs=RUNS):
     """Return by run the relative bias of the image and of its four quarters, (runs, 5)."""
-    made, reference = renderer(scene, find_method(method), **parameters), truth(scene).airlight
+    made, reference = renderer(scene, find_method(method), **parameters), reference_of(scene).airlight
     half = SIZE[1] // 2, SIZE[0] // 2
     parts = [
         np.s_[:, :],

@@ -26,19 +26,19 @@ def lit_by_hand(points, light, centre, radius):
 
 def runs_by_hand(scene, distance, steps, spacing):
     """Add up, cell by cell, twelve Gauss nodes of the integrand where the middle of the cell is lit."""
-    truth = read_reference(mi.load_dict(scene))
-    light, centre, radius = truth.lights[0], np.array(scene["ball"]["center"]), scene["ball"]["radius"]
-    sigma, albedo = truth.medium.sigma_t, truth.medium.albedo
+    reference = read_reference(mi.load_dict(scene))
+    light, centre, radius = reference.lights[0], np.array(scene["ball"]["center"]), scene["ball"]["radius"]
+    sigma, albedo = reference.medium.sigma_t, reference.medium.albedo
     nodes, weights = np.polynomial.legendre.leggauss(12)
-    image = np.zeros((len(truth.direction), 3))
-    for pixel, (direction, end) in enumerate(zip(truth.direction, distance.ravel(), strict=True)):
-        foot = (light.position - truth.origin) @ direction
-        height = np.linalg.norm(light.position - truth.origin - foot * direction)
+    image = np.zeros((len(reference.direction), 3))
+    for pixel, (direction, end) in enumerate(zip(reference.direction, distance.ravel(), strict=True)):
+        foot = (light.position - reference.origin) @ direction
+        height = np.linalg.norm(light.position - reference.origin - foot * direction)
         angles = np.arctan2(np.array([0.0, end]) - foot, height)
         ends = np.array([0.0, end]) if spacing == "uniform" else angles
         edges = ends[0] + np.arange(2 * steps + 1) / (2 * steps) * (ends[1] - ends[0])
         x = edges if spacing == "uniform" else foot + height * np.tan(edges)
-        lit = lit_by_hand(truth.origin + x[1::2, None] * direction, light.position, centre, radius)
+        lit = lit_by_hand(reference.origin + x[1::2, None] * direction, light.position, centre, radius)
         for number in np.flatnonzero(lit):
             begin, close = x[2 * number], x[2 * number + 2]
             at = 0.5 * (begin + close) + 0.5 * (close - begin) * nodes
@@ -46,7 +46,7 @@ def runs_by_hand(scene, distance, steps, spacing):
             value = np.exp(-sigma[:, None] * (at + r)) / r**2
             image[pixel] += value @ weights * 0.5 * (close - begin)
     scale = albedo * sigma * light.intensity / (4 * np.pi)
-    return (scale * image).reshape(truth.height, truth.width, 3)
+    return (scale * image).reshape(reference.height, reference.width, 3)
 
 
 @pytest.mark.claim("billeter-marcher", tolerance="relative RMSE 1e-5 of twelve nodes in every lit cell")
@@ -76,10 +76,10 @@ def test_without_shadows_the_kernel_is_all(variant, name, spacing):
 @pytest.mark.claim("billeter-marcher", tolerance="0.25 of the order 1")
 def test_with_shadows_the_order_is_one(variant):
     scene = tiny_scene(size=(48, 36))
-    truth = render("ray-march", scene=scene, steps=6000, sum="transitions")
+    reference = render("ray-march", scene=scene, steps=6000, sum="transitions")
     steps = np.array([12, 48, 192])
     errors = [
-        relative_rmse(render("ray-march", scene=scene, steps=int(n), spacing="uniform", sum="transitions"), truth)
+        relative_rmse(render("ray-march", scene=scene, steps=int(n), spacing="uniform", sum="transitions"), reference)
         for n in steps
     ]
     order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]

@@ -17,7 +17,7 @@ from realtime.methods.shader.client import ShaderHost
 from realtime.methods.shader.source import Pass, read_shader
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import read_scene
-from tests.helpers.frames import relative_rmse, render, truth
+from tests.helpers.frames import reference_of, relative_rmse, render
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from tests.helpers.shaders import EXAMPLES, need_opengl
 
@@ -88,14 +88,14 @@ def test_a_marcher_with_shadow_maps_is_the_one_of_dr_jit_with_the_same_steps(dra
 
 def test_a_marcher_converges_to_the_reference_under_a_soft_spot_in_a_lobe(drawn):
     scene = tiny_scene(size=(16, 12), lamp2=spot(beam=11.0), **_fog(0.7), **_EMPTY)
-    text, expected = (EXAMPLES / "marcher.glsl").read_text(), truth(scene).airlight
+    text, expected = (EXAMPLES / "marcher.glsl").read_text(), reference_of(scene).airlight
     few, many = (relative_rmse(drawn(text, scene, STEPS=steps).airlight, expected) for steps in (64, 512))
     assert many < few / 5
     assert many < 5e-4
     backward = text.replace("phase(-s / r)", "phase(s / r)")
     assert relative_rmse(drawn(backward, scene, STEPS=64).airlight, expected) > 0.2
     even = scene | _fog(0.0)
-    assert relative_rmse(drawn(backward, even, STEPS=64).airlight, truth(even).airlight) < 0.01
+    assert relative_rmse(drawn(backward, even, STEPS=64).airlight, reference_of(even).airlight) < 0.01
 
 
 @pytest.mark.parametrize(("phase", "g"), [({"type": "rayleigh"}, 0.0), (_TABLE, None)])

@@ -44,12 +44,12 @@ def test_the_mean_is_the_same_and_spreads_less(variant):
     less than 4 of their standard errors (1 in 16 000 by chance), and a smaller error of the image mean for the
     airlight.
     """
-    truth = read_reference(mi.load_dict(tiny_scene(size=(12, 9))))
-    shape = (truth.height, truth.width)
+    reference = read_reference(mi.load_dict(tiny_scene(size=(12, 9))))
+    shape = (reference.height, reference.width)
     masks = {layer: np.ones(shape, dtype=bool) for layer in LAYERS}
 
     def run(first, count, counts=None):
-        batches = [volpath_batch(truth, first + number, 32, counts=counts) for number in range(count)]
+        batches = [volpath_batch(reference, first + number, 32, counts=counts) for number in range(count)]
         pooled = batches[0]
         for batch in batches[1:]:
             pooled = merged(pooled, batch)
@@ -71,11 +71,11 @@ def test_the_mean_is_the_same_and_spreads_less(variant):
 
 def test_counts_are_those_of_each_pixel(variant):
     """A pixel with as many samples as it had in a batch of its own scene has the same law; one part or many agree."""
-    truth = read_reference(mi.load_dict(tiny_scene(size=(4, 3))))
+    reference = read_reference(mi.load_dict(tiny_scene(size=(4, 3))))
     counts = np.stack([np.arange(1, 13), np.arange(12, 0, -1)]).astype(np.uint32)
-    batch = volpath_batch(truth, 5, 8, counts=counts)
+    batch = volpath_batch(reference, 5, 8, counts=counts)
     assert batch.mean.shape == (2, 12, 3)
     assert np.all(np.isfinite(batch.mean))
-    equal = volpath_batch(truth, 5, 8)
-    same = volpath_batch(truth, 5, 8, counts=np.full((2, 12), 8, dtype=np.uint32))
+    equal = volpath_batch(reference, 5, 8)
+    same = volpath_batch(reference, 5, 8, counts=np.full((2, 12), 8, dtype=np.uint32))
     assert np.array_equal(equal.mean, same.mean)

@@ -49,10 +49,10 @@ def _reference(**changes):
     return read_reference(mi.load_dict(scene))
 
 
-def _run(batch, truth, samples, batches=_BATCHES):
-    done = batch(truth, 0, samples)
+def _run(batch, reference, samples, batches=_BATCHES):
+    done = batch(reference, 0, samples)
     for seed in range(1, batches):
-        done = merged(done, batch(truth, seed, samples))
+        done = merged(done, batch(reference, seed, samples))
     return done
 
 
@@ -116,9 +116,9 @@ def test_both_estimators_agree(variant, name):
     Expected: airlight and surface pooled within four standard errors, and 0.05 % for the shadow-ray epsilon.
     """
     kind, bsdf, in_view = _CASES[name]["lamp"]
-    truth = _reference(lamp=_lamp(kind, bsdf, in_view=in_view))
+    reference = _reference(lamp=_lamp(kind, bsdf, in_view=in_view))
     batches = 60 if (kind, bsdf) == ("mesh", NULL) else _BATCHES
-    ours, theirs = (_run(batch, truth, 256, batches) for batch in (single_scatter_batch, volpath_batch))
+    ours, theirs = (_run(batch, reference, 256, batches) for batch in (single_scatter_batch, volpath_batch))
     for layer in (0, 1):
         (mean, error), (other, other_error) = _pooled(ours, layer), _pooled(theirs, layer)
         together = np.hypot(error, other_error)
@@ -133,16 +133,16 @@ def test_both_estimators_agree(variant, name):
 def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
     """Rationale: without fog, Mitsuba's `direct` is a third way to the light on surfaces."""
     fog = tiny_scene()["fog"] | {"sigma_t": 0.0}
-    truth = _reference(lamp=_lamp(kind, BLACK), fog=fog)
-    ours = _run(single_scatter_batch, truth, 256)
-    pixels, samples = len(truth.direction), 4096
+    reference = _reference(lamp=_lamp(kind, BLACK), fog=fog)
+    ours = _run(single_scatter_batch, reference, 256)
+    pixels, samples = len(reference.direction), 4096
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(3, pixels * samples)
     pixel = dr.arange(mi.UInt32, pixels * samples) // samples
-    direction = dr.gather(mi.Vector3f, mi.Vector3f(truth.direction.T), pixel)
-    start = mi.Point3f(*(float(c) for c in truth.origin))
+    direction = dr.gather(mi.Vector3f, mi.Vector3f(reference.direction.T), pixel)
+    start = mi.Point3f(*(float(c) for c in reference.origin))
     direct = mi.load_dict({"type": "direct", "hide_emitters": True})
-    seen, _, _ = direct.sample(truth.scene, sampler, mi.RayDifferential3f(mi.Ray3f(start, direction)))
+    seen, _, _ = direct.sample(reference.scene, sampler, mi.RayDifferential3f(mi.Ray3f(start, direction)))
     values = np.array(seen, dtype=np.float64).T.reshape(pixels, samples, 3)
     expected, spread = values.mean(axis=(0, 1)), np.sqrt((values.var(axis=1) / samples).sum(axis=0)) / pixels
     mean, error = _pooled(ours, 1)

@@ -97,7 +97,7 @@ def test_a_mesh_of_a_quad_is_the_rectangle_and_of_a_sphere_the_sphere(variant):
     fine = placed(scaled(icosphere(3), 0.4), (0.3, 0.4, 2.9))
     for mesh, light in ((placed(quad, (0.3, 0.4, 2.9), turn), flat()), (fine, ball())):
         one, other = room(mesh_lamp(mesh)), room(light)
-        images = [quadrature_image(truth, plan=fixed(64)) for truth in (one, other)]
+        images = [quadrature_image(reference, plan=fixed(64)) for reference in (one, other)]
         share = one.area[0].area / other.area[0].area
         for layer in ("airlight", "surface"):
             found, wanted = (getattr(image, layer) for image in images)
@@ -108,32 +108,32 @@ def test_a_mesh_of_a_quad_is_the_rectangle_and_of_a_sphere_the_sphere(variant):
 
 def test_one_sample_by_plain_quadrature(variant):
     """The integral along the ray of cos_l V/r^2 exp(-sigma_t (x + r)), with the cosine as a dot product."""
-    truth = empty(flat())
-    light, square = truth.area[0], np.array([[0.3, 0.8]])
+    reference = empty(flat())
+    light, square = reference.area[0], np.array([[0.3, 0.8]])
     nodes, weights = roots_legendre(2000)  # NumPy's takes ten seconds
-    x, distance = 3.5 * (nodes + 1), np.full(len(truth.direction), 7.0)
-    samples = samples_for_rays(light, truth.origin, truth.direction, distance, square)
-    (beam,) = beams_of(truth, distance)
+    x, distance = 3.5 * (nodes + 1), np.full(len(reference.direction), 7.0)
+    samples = samples_for_rays(light, reference.origin, reference.direction, distance, square)
+    (beam,) = beams_of(reference, distance)
     got = area_lights._scattered(beam, np.arange(len(distance)), square, 1.0)["radiance"]
-    for ray, direction in enumerate(truth.direction):
-        away = truth.origin + x[:, None] * direction - samples.place[ray]
+    for ray, direction in enumerate(reference.direction):
+        away = reference.origin + x[:, None] * direction - samples.place[ray]
         r = np.linalg.norm(away, axis=1)
-        f = np.maximum(away @ light.normal / r, 0) / r**2 * np.exp(-truth.medium.sigma_t[0] * (x + r))
-        factor = truth.medium.albedo * truth.medium.sigma_t * light.radiance * samples.weight[ray] / (4 * np.pi)
+        f = np.maximum(away @ light.normal / r, 0) / r**2 * np.exp(-reference.medium.sigma_t[0] * (x + r))
+        factor = reference.medium.albedo * reference.medium.sigma_t * light.radiance * samples.weight[ray] / (4 * np.pi)
         assert got[ray] == pytest.approx(factor * 3.5 * (f @ weights), rel=1e-5)
 
 
 def test_a_sphere_in_fog_is_exact_beside_its_edge(variant):
     """48 x 36 pixels around a sphere of radius 0.41 m, 5 m away, by the default plan, against its closed form."""
     sigma_t, radius, far = 0.21, 0.41, 5.0
-    truth = lit_room(lamp("sphere", center=[0.0, 0.0, far], radius=radius), medium=fog(sigma_t, 1.0), empty=True)
-    light = replace(truth.area[0], centre=np.array([0, 0, far]), radiance=np.ones(3))
+    reference = lit_room(lamp("sphere", center=[0.0, 0.0, far], radius=radius), medium=fog(sigma_t, 1.0), empty=True)
+    light = replace(reference.area[0], centre=np.array([0, 0, far]), radiance=np.ones(3))
     column, row = np.meshgrid((np.arange(48) - 23.5) / 24, (np.arange(36) - 17.5) / 24)
     direction = np.stack([0.5 * column.ravel(), 0.5 * row.ravel(), np.ones(48 * 36)], axis=1)
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     height = far * np.hypot(direction[:, 0], direction[:, 1])
     direction = direction[height > radius]
-    rays = replace(truth, area=(light,), origin=np.zeros(3), direction=direction)
+    rays = replace(reference, area=(light,), origin=np.zeros(3), direction=direction)
     got = airlight_replicates(rays, PointPlan(), np.full(len(direction), 20.0))[:, 0].mean(axis=1)
     height, foot = far * np.hypot(direction[:, 0], direction[:, 1]), far * direction[:, 2]
     closed = [sphere_airlight(sigma_t, h, radius, foot=f, x0=0.0, x1=20.0) for h, f in zip(height, foot, strict=True)]
@@ -166,10 +166,10 @@ def test_half_a_plane_before_a_rectangle(variant):
         "cover": {"type": "rectangle", "to_world": up.translate([0, edge - 50, over]).scale([60, 50, 1]), "bsdf": GREY},
     }
     camera = up.look_at([0.3, 0.2, 0.9], [0.1, 0.15, 0.0], [0, 1, 0])
-    truth = read_reference(lit_scene(size=(16, 12), to_world=camera, medium=fog(0.0, 0.5), **shapes))
-    hits = surface_hits(truth)
-    hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
-    x, y, _ = (truth.origin + hits.distance[:, None] * truth.direction).T
+    reference = read_reference(lit_scene(size=(16, 12), to_world=camera, medium=fog(0.0, 0.5), **shapes))
+    hits = surface_hits(reference)
+    hits = replace(hits, distance=exact_distance(reference, hits.interaction, hits.distance))
+    x, y, _ = (reference.origin + hits.distance[:, None] * reference.direction).T
 
     def from_foot(across, along):
         first, second = np.hypot(across, high), np.hypot(along, high)
@@ -179,7 +179,7 @@ def test_half_a_plane_before_a_rectangle(variant):
     sides = [(1, a, b), (-1, -a, b), (-1, a, left), (1, -a, left)]
     expected = sum(sign * from_foot(end - x, side - y) for sign, end, side in sides) / np.pi
     known = np.zeros((len(x), 3))
-    got = area_surface(truth, hits, beams_of(truth, hits.distance), known, plan=PointPlan())[:, 0].mean(axis=1)
+    got = area_surface(reference, hits, beams_of(reference, hits.distance), known, plan=PointPlan())[:, 0].mean(axis=1)
     assert 0.4 < np.mean((left > -b) & (left < b)) < 0.8
     assert np.sqrt(np.mean((got - expected) ** 2)) < 1.3e-3 * expected.mean()
 
@@ -187,17 +187,17 @@ def test_half_a_plane_before_a_rectangle(variant):
 @pytest.mark.parametrize("kind", ["mesh", "rectangle", "sphere", pytest.param("disk", marks=pytest.mark.slow)])
 def test_surfaces_by_many_shadow_rays(variant, kind):
     """Samples in the solid angle against even points of the light, each seen or not along one float64 ray."""
-    truth = room((LAMPS | MESH)[kind](), size=(8, 6))
-    hits = surface_hits(truth)
-    hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
+    reference = room((LAMPS | MESH)[kind](), size=(8, 6))
+    hits = surface_hits(reference)
+    hits = replace(hits, distance=exact_distance(reference, hits.interaction, hits.distance))
     known = np.zeros((len(hits.distance), 3))
-    lit = area_surface(truth, hits, beams_of(truth, hits.distance), known, plan=fixed(256))
+    lit = area_surface(reference, hits, beams_of(reference, hits.distance), known, plan=fixed(256))
     rows = np.flatnonzero(np.isfinite(hits.distance))
-    point = truth.origin + hits.distance[rows, None] * truth.direction[rows]
+    point = reference.origin + hits.distance[rows, None] * reference.direction[rows]
     normal = np.array(hits.interaction.n, dtype=float).T[rows]
-    normal *= -np.sign(np.sum(normal * truth.direction[rows], axis=1))[:, None]
+    normal *= -np.sign(np.sum(normal * reference.direction[rows], axis=1))[:, None]
     reflection = Reflection(hits.interaction)
-    light, (_, shapes) = truth.area[0], before_light(truth, truth.area[0])
+    light, (_, shapes) = reference.area[0], before_light(reference, reference.area[0])
     count, replicates = 32, 8
     expected = np.zeros((len(rows), 3, replicates))
     for replicate in range(replicates):
@@ -209,7 +209,7 @@ def test_surfaces_by_many_shadow_rays(variant, kind):
             end = np.broadcast_to(sample.position + 1e-6 * sample.axis, start.shape)
             seen = ~segments_blocked(start, end, shapes) & (np.sum(way * normal, axis=1) > 0)
             sent = np.maximum(-way @ sample.axis, 0) / r**2 * seen
-            leg = np.exp(-np.outer(r + hits.distance[rows], truth.medium.sigma_t))
+            leg = np.exp(-np.outer(r + hits.distance[rows], reference.medium.sigma_t))
             expected[..., replicate] += reflection(rows, way) * sent[:, None] * leg * sample.intensity / count
     assert 0.1 < np.mean(lit[rows, 0].mean(axis=1) > 0) < 1
     difference = lit[rows].mean(axis=2) - expected.mean(axis=2)

@@ -19,8 +19,8 @@ FINE_TABLE = {
 
 
 def reference_and_image(scene, **settings):
-    truth = read_reference(mi.load_dict(scene))
-    return truth, quadrature_image(truth, **settings)
+    reference = read_reference(mi.load_dict(scene))
+    return reference, quadrature_image(reference, **settings)
 
 
 def in_fog(shape):
@@ -67,12 +67,12 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     In fog, parts are up to 60 m long, and steps longer: 2e-7 there; with 16 times as many both agree to 3e-9.
     """
     rtol = 2e-7 if "fog" in case else 1e-8
-    truth, image = reference_and_image(CASES[case]())
+    reference, image = reference_and_image(CASES[case]())
     airlight, bound = image.airlight.reshape(-1, 3), image.airlight_bound.reshape(-1, 3)
     lit = np.flatnonzero(airlight.max(axis=1) > 0)
     assert len(lit) >= 3
     for pixel in lit[:: max(1, len(lit) // 4)]:
-        expected = plain_airlight(truth, pixel)
+        expected = plain_airlight(reference, pixel)
         assert airlight[pixel] == pytest.approx(expected, rel=rtol), pixel
     # 1e-10 is asked for; edges of light and shadow, of which there are none here, add 2e-6 of a strip for each end.
     assert np.all(bound[lit] <= 1e-4 * airlight[lit])
@@ -82,17 +82,17 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
 def test_leg_of_the_surface_is_darkened_too(variant):
     """A lamp above the sphere: the floor below it is darker by the chord of the leg and of the view."""
     changes = {"floor": tiny_scene()["floor"], "lamp": tiny_scene()["lamp"] | {"position": [0.6, 0.4, 2.3]}}
-    truth, image = reference_and_image(clear_scene(pearl=pearl(), **changes))
+    reference, image = reference_and_image(clear_scene(pearl=pearl(), **changes))
     _, clear = reference_and_image(clear_scene(pearl=pearl(0.0), **changes))
     distance = clear.distance.reshape(-1)
     hit = np.isfinite(distance)
-    point = truth.origin + distance[hit, None] * truth.direction[hit]
-    leg = point - truth.lights[0].position
+    point = reference.origin + distance[hit, None] * reference.direction[hit]
+    leg = point - reference.lights[0].position
     length = np.linalg.norm(leg, axis=1)
     depth = np.zeros(len(point))
     for origin, direction, end in (
-        (truth.origin, truth.direction[hit], distance[hit]),
-        (truth.lights[0].position, leg / length[:, None], length),
+        (reference.origin, reference.direction[hit], distance[hit]),
+        (reference.lights[0].position, leg / length[:, None], length),
     ):
         near, far = CHORDS["pearl"](origin, direction)
         depth += np.maximum(np.minimum(far, end) - np.maximum(near, 0), 0)
@@ -110,22 +110,22 @@ def test_camera_inside_of_a_body(variant):
     scene["sensor"] |= {"to_world": to_world, "medium": {"type": "ref", "id": "mist"}}
     scene["brick"]["interior"] = {"type": "ref", "id": "mist"}
     scene = {"type": "scene", "mist": inside} | scene
-    truth, image = reference_and_image(scene)
+    reference, image = reference_and_image(scene)
     airlight = image.airlight.reshape(-1, 3)
     assert np.all(airlight > 0)
     for pixel in (0, 27):
-        expected = plain_airlight(truth, pixel)
+        expected = plain_airlight(reference, pixel)
         assert airlight[pixel] == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.claim("infinite-through-the-light")
 def test_ray_through_a_lamp(variant):
     """In a vacuum between two bodies a ray may meet the lamp: the airlight is finite. Inside of one it is infinite."""
-    truth, _ = reference_and_image(clear_scene(size=(12, 9), brick=brick()))
-    near, far = CHORDS["brick"](truth.origin, truth.direction)
+    reference, _ = reference_and_image(clear_scene(size=(12, 9), brick=brick()))
+    near, far = CHORDS["brick"](reference.origin, reference.direction)
     pixel = int(np.argmax(far - near))
     for distance in (0.5 * near[pixel], 0.5 * (near + far)[pixel]):
-        position = truth.origin + distance * truth.direction[pixel]
+        position = reference.origin + distance * reference.direction[pixel]
         lamp = tiny_scene()["lamp"] | {"position": [float(c) for c in position]}
         _, image = reference_and_image(clear_scene(size=(12, 9), brick=brick(), lamp=lamp))
         value = image.airlight.reshape(-1, 3)[pixel]
@@ -153,9 +153,9 @@ def test_agrees_with_volpath(variant, inside):
         scene["sensor"] = tiny_scene()["sensor"]
         scene["near"] = bounded_medium(huge, 0.0, (0.0, 0.0, 0.0)) | {"interior": {"type": "ref", "id": "fog"}}
         scene = {"type": "scene", "fog": tiny_scene()["fog"]} | scene
-    truth = read_reference(mi.load_dict(scene))
-    assert_volpath_agrees(truth, batches=16, least_precision=0.03)
-    again = read_reference(truth.scene)
-    for before, after in zip(truth.media, again.media, strict=True):
+    reference = read_reference(mi.load_dict(scene))
+    assert_volpath_agrees(reference, batches=16, least_precision=0.03)
+    again = read_reference(reference.scene)
+    for before, after in zip(reference.media, again.media, strict=True):
         assert np.array_equal(before.sigma_t, after.sigma_t)
         assert np.array_equal(before.albedo, after.albedo)

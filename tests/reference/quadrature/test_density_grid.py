@@ -25,7 +25,7 @@ BATCHES = 40
 
 
 @pytest.fixture
-def truth(variant, tmp_path):
+def reference(variant, tmp_path):
     def read(*lights, values=ROUGH, albedo=ALBEDO, shapes=SHAPES, **how):
         path = tmp_path / "grid.xml"
         path.write_text(grid_xml(volume(tmp_path / "smoke.vol", values, **how), *lights, albedo=albedo, shapes=shapes))
@@ -50,13 +50,13 @@ def box_ends(start, way, medium):
 
 
 @pytest.mark.claim("density-grid-reference", tolerance="1e-9 relative: scipy's quad, cut at nothing")
-def test_optical_depths_are_those_of_scipy(truth):
+def test_optical_depths_are_those_of_scipy(reference):
     random = np.random.default_rng(5)
     origin, end = random.uniform(LOW - 1, HIGH + 1, (2, 4, 3))
     end[0], origin[1, 2] = origin[0] + [0, 0, 5], end[1, 2]  # along an axis, and in a plane
     length = np.linalg.norm(end - origin, axis=1)
     way = (end - origin) / length[:, None]
-    scene = truth(LAMP)
+    scene = reference(LAMP)
     found = field_of(scene).optical_depth(origin, way, np.zeros(4), length)
     for start, direction, far, depth in zip(origin, way, length, found, strict=True):
 
@@ -71,8 +71,8 @@ def test_optical_depths_are_those_of_scipy(truth):
 
 @pytest.mark.claim("density-grid-reference", tolerance="3e-5 relative: 1000 steps with kinks, and 600 to the light")
 @pytest.mark.parametrize("light", [LAMP, SUN])
-def test_airlight_by_look_ups_alone(truth, light):
-    scene = truth(light, shapes="")
+def test_airlight_by_look_ups_alone(reference, light):
+    scene = reference(light, shapes="")
     image = quadrature_image(scene, checks=0)
     radiance, bound = (part.reshape(-1, 3) for part in (image.airlight, image.airlight_bound))
     for row in (86, 106, 121):
@@ -101,9 +101,9 @@ def test_airlight_by_look_ups_alone(truth, light):
 
 
 @pytest.mark.claim("density-grid-reference", tolerance="1e-5 relative: twice what panels of the grid may differ by")
-def test_a_constant_grid_is_homogeneous_fog(truth, tmp_path):
+def test_a_constant_grid_is_homogeneous_fog(reference, tmp_path):
     lights = LAMP, SPOT, SUN
-    even = quadrature_image(truth(*lights, values=np.full((4, 3, 5), 0.25, np.float32)), checks=0)
+    even = quadrature_image(reference(*lights, values=np.full((4, 3, 5), 0.25, np.float32)), checks=0)
     text = grid_xml('<float name="sigma_t" value="0.25"/>', *lights).replace('<ref id="smoke" name="medium"/>', "")
     size, corner = (", ".join(map(str, each)) for each in (0.5 * (HIGH - LOW), 0.5 * (HIGH + LOW)))
     cube = f"""<shape type="cube" id="box"><bsdf type="null"/><ref id="smoke" name="interior"/>
@@ -118,8 +118,8 @@ def test_a_constant_grid_is_homogeneous_fog(truth, tmp_path):
 
 @pytest.mark.claim("density-grid-reference", tolerance="none: the same numbers")
 @pytest.mark.parametrize("size", [1.0, 1.3])
-def test_a_shape_that_holds_the_box_bounds_nothing(truth, tmp_path, size):
-    plain = truth(LAMP, SUN)
+def test_a_shape_that_holds_the_box_bounds_nothing(reference, tmp_path, size):
+    plain = reference(LAMP, SUN)
     half, corner = (", ".join(map(str, each)) for each in (0.5 * size * (HIGH - LOW), 0.5 * (HIGH + LOW)))
     cube = f"""<shape type="cube" id="box"><bsdf type="null"/><ref name="interior" id="smoke"/>
         <transform name="to_world"><scale value="{half}"/><translate value="{corner}"/></transform></shape></scene>"""
@@ -138,10 +138,10 @@ def test_a_shape_that_holds_the_box_bounds_nothing(truth, tmp_path, size):
 
 
 @pytest.mark.claim("density-grid-reference", tolerance="1e-12 relative: rounding")
-def test_a_linear_function_of_height_has_no_error_of_interpolation(truth):
+def test_a_linear_function_of_height_has_no_error_of_interpolation(reference):
     count = 8
     values = np.broadcast_to(((2 + np.arange(count)) / 8)[:, None, None], (count, 3, 4)).astype(np.float32)
-    scene = truth(LAMP, values=values)
+    scene = reference(LAMP, values=values)
     low, high = scene.medium.low, scene.medium.high
     half = 0.5 * (high - low) / [4, 3, count]
     origin, end = np.random.default_rng(2).uniform(low + half, high - half, (2, 20, 3))
@@ -167,11 +167,11 @@ def test_a_linear_function_of_height_has_no_error_of_interpolation(truth):
         ),
     ],
 )
-def test_other_grids_are_refused_by_name(truth, tmp_path, how, words):
+def test_other_grids_are_refused_by_name(reference, tmp_path, how, words):
     if "albedo" in how:
         how = {"albedo": how["albedo"].replace("FILE", str(tmp_path / "smoke.vol"))}
     with pytest.raises(InputError, match=words):
-        truth(LAMP, **how)
+        reference(LAMP, **how)
 
 
 #: Faults that the comparison with volpath must find, by name.
@@ -191,9 +191,9 @@ FAULTS = {
 
 @pytest.mark.slow
 @pytest.mark.claim("density-grid-volpath", tolerance="0.5 % of the image, 95 % intervals of 40 batches")
-def test_both_estimators_agree_and_injected_faults_are_found(truth):
+def test_both_estimators_agree_and_injected_faults_are_found(reference):
     for light in (INSIDE, SUN):
-        scene = truth(light)
+        scene = reference(light)
         tracked = [single_scatter_batch(scene, seed, 256) for seed in range(3 * BATCHES)]
         exact = quadrature_image(scene, checks=0)
         assert all(abs(bias) + half < 0.005 for bias, half in biases(scene, exact, tracked))
@@ -201,8 +201,8 @@ def test_both_estimators_agree_and_injected_faults_are_found(truth):
 
         def outside(changes=(), light=light, batches=batches):
             with injected(*changes):
-                image = quadrature_image(truth(light), checks=0, shadow_scale=1 - measure_shadow_epsilon())
-            found = biases(truth(light), image, batches)
+                image = quadrature_image(reference(light), checks=0, shadow_scale=1 - measure_shadow_epsilon())
+            found = biases(reference(light), image, batches)
             return [abs(bias) + half > 0.005 for bias, half in found]
 
         assert not any(outside())

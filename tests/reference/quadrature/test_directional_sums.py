@@ -17,8 +17,8 @@ TABLE = {"phase": {"type": "tabphase", "values": "0.5, 0.2, 0.4, 1.7"}}
 
 
 def reference_and_image(scene, **settings):
-    truth = read_reference(mi.load_dict(scene))
-    return truth, quadrature_image(truth, **settings)
+    reference = read_reference(mi.load_dict(scene))
+    return reference, quadrature_image(reference, **settings)
 
 
 CASES = {
@@ -34,7 +34,7 @@ CASES = {
 FAST = ("one in the light of the other", "light along an axis", "towards the camera")
 
 
-@pytest.mark.claim("directional-truth", tolerance="2e-8 relative, 2e-5 along an axis: the steps' own")
+@pytest.mark.claim("directional-reference", tolerance="2e-8 relative, 2e-5 along an axis: the steps' own")
 @pytest.mark.parametrize("case", [pytest.param(case, marks=[] if case in FAST else pytest.mark.slow) for case in CASES])
 def test_airlight_is_the_sum_over_small_steps(variant, case):
     """Rationale: nothing is shared with the estimator but the rays: own chords, own rule, no kinks looked for.
@@ -43,17 +43,17 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     where the light enters a face or passes beside it 1/200000.
     """
     rtol = 2e-5 if case == "light along an axis" else 2e-8
-    truth, image = reference_and_image(CASES[case]())
+    reference, image = reference_and_image(CASES[case]())
     airlight, bound = image.airlight.reshape(-1, 3), image.airlight_bound.reshape(-1, 3)
     lit = np.flatnonzero(airlight.max(axis=1) > 0)
     assert len(lit) >= 3
     for pixel in lit[:: max(1, len(lit) // 3)]:
-        assert airlight[pixel] == pytest.approx(plain_airlight(truth, pixel), rel=rtol), pixel
+        assert airlight[pixel] == pytest.approx(plain_airlight(reference, pixel), rel=rtol), pixel
     assert np.all(bound[lit] <= 2e-9 * airlight[lit])
     assert np.all(bound[lit] > 0)
 
 
-@pytest.mark.claim("directional-truth", tolerance="1e-12 relative")
+@pytest.mark.claim("directional-reference", tolerance="1e-12 relative")
 @pytest.mark.parametrize("way", ["across", "with the ray", "against it"])
 def test_ray_through_a_box_in_closed_form(variant, way):
     """Light that falls on the box's upper face, along the ray's own direction, and against it.
@@ -64,10 +64,10 @@ def test_ray_through_a_box_in_closed_form(variant, way):
 
     origin, direction = np.array([-0.5, -2.0, 0.71875]), np.array([0.0, 1.0, 0.0])
     directions = {"across": [0.0, 0.0, -1.0], "with the ray": [0.0, 1.0, 0.0], "against it": [0.0, -1.0, 0.0]}
-    truth, _ = reference_and_image(sunny(brick=brick(**HG), sun=sun(directions[way])))
-    around = replace(truth, origin=origin, direction=direction[None], width=1, height=1)
+    reference, _ = reference_and_image(sunny(brick=brick(**HG), sun=sun(directions[way])))
+    around = replace(reference, origin=origin, direction=direction[None], width=1, height=1)
     values = ray_values(around)
-    (medium,) = truth.media
+    (medium,) = reference.media
     sigma_t, length = medium.sigma_t, 2 * BRICK[1][1]
     cos_scatter = -float(np.dot(directions[way], direction))
     if way == "across":
@@ -79,7 +79,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
         integral = np.exp(-sigma_t * length) * length
     g = float(np.float32(0.6))
     p = (1 - g * g) / (1 + g * g - 2 * g * cos_scatter) ** 1.5
-    expected = truth.directional[0].irradiance / (4 * np.pi) * medium.albedo * sigma_t * p * integral
+    expected = reference.directional[0].irradiance / (4 * np.pi) * medium.albedo * sigma_t * p * integral
     assert values.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
     assert np.all(values.bound < 1e-6 * values.airlight)
 
@@ -88,8 +88,8 @@ def test_shadow_of_a_sphere_in_fog(variant):
     """A sphere between sun and box: points by the distance of its centre from their legs, and the plain sum."""
     centre, radius = np.array([-0.71875, 0.25, 1.21875]), 0.1875
     caster = {"type": "sphere", "center": centre.tolist(), "radius": radius}
-    truth, image = reference_and_image(sunny(brick=brick(), caster=caster))
-    towards = -truth.directional[0].direction
+    reference, image = reference_and_image(sunny(brick=brick(), caster=caster))
+    towards = -reference.directional[0].direction
 
     def lit(point):
         off = centre - point
@@ -100,8 +100,8 @@ def test_shadow_of_a_sphere_in_fog(variant):
     pixels = np.flatnonzero(airlight.max(axis=1) > 0)
     shadowed = 0
     for pixel in pixels[::5]:
-        expected = plain_airlight(truth, pixel, lit=lit)
-        shadowed += int(np.any(expected < 0.999 * plain_airlight(truth, pixel)))
+        expected = plain_airlight(reference, pixel, lit=lit)
+        shadowed += int(np.any(expected < 0.999 * plain_airlight(reference, pixel)))
         # Both edges are met to half a step of 1/200000.
         assert airlight[pixel] == pytest.approx(expected, rel=1e-5), pixel
     assert shadowed >= 2
@@ -112,16 +112,19 @@ def test_shadow_of_a_sphere_in_fog(variant):
 def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
     """The floor below the sphere of fog: E cos albedo/pi, less the chords of the leg and of the view."""
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(6.3), "bsdf": {"type": "diffuse"}}
-    truth, image = reference_and_image(sunny(pearl=pearl(), floor=floor))
+    reference, image = reference_and_image(sunny(pearl=pearl(), floor=floor))
     distance = image.distance.reshape(-1)
     hit = np.isfinite(distance)
-    point = truth.origin + distance[hit, None] * truth.direction[hit]
-    towards = np.broadcast_to(-truth.directional[0].direction, point.shape)
+    point = reference.origin + distance[hit, None] * reference.direction[hit]
+    towards = np.broadcast_to(-reference.directional[0].direction, point.shape)
     depth = np.zeros(len(point))
-    for origin, direction, end in ((truth.origin, truth.direction[hit], distance[hit]), (point, towards, np.inf)):
+    for origin, direction, end in (
+        (reference.origin, reference.direction[hit], distance[hit]),
+        (point, towards, np.inf),
+    ):
         near, far = CHORDS["pearl"](origin, direction)
         depth += np.maximum(np.minimum(far, end) - np.maximum(near, 0), 0)
-    clear = 0.5 / np.pi * towards[0, 2] * truth.directional[0].irradiance
+    clear = 0.5 / np.pi * towards[0, 2] * reference.directional[0].irradiance
     expected = clear * np.exp(-1.3 * depth)[:, None]
     assert np.sum(depth > 0.1) > 5
     assert image.surface.reshape(-1, 3)[hit] == pytest.approx(

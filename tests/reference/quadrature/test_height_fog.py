@@ -37,11 +37,11 @@ def scene(variant, tmp_path):
 
 @pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the height of the scene over H = 1e8 m")
 def test_a_large_scale_height_is_the_image_of_homogeneous_fog(scene):
-    truth = read_reference(scene(LAMP, SPOT, PANEL, size=(8, 6)))
-    plain = ReferenceMedium(np.full(3, 0.06), truth.medium.albedo, truth.medium.phase, truth.medium.plugin)
-    deep = replace(truth.medium, layers=((0.06, 0.0, 1e8),), constant=0.0, floor=-np.inf, cap=np.inf)
+    reference = read_reference(scene(LAMP, SPOT, PANEL, size=(8, 6)))
+    plain = ReferenceMedium(np.full(3, 0.06), reference.medium.albedo, reference.medium.phase, reference.medium.plugin)
+    deep = replace(reference.medium, layers=((0.06, 0.0, 1e8),), constant=0.0, floor=-np.inf, cap=np.inf)
     how = {"checks": 0, "plan": PointPlan(error=0.0, first=4, most=4)}
-    images = [quadrature_image(replace(truth, medium=medium), **how) for medium in (plain, deep)]
+    images = [quadrature_image(replace(reference, medium=medium), **how) for medium in (plain, deep)]
     for layer in ("airlight", "surface", "emitted"):
         expected, found = (getattr(image, layer) for image in images)
         np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * expected.max())
@@ -49,19 +49,19 @@ def test_a_large_scale_height_is_the_image_of_homogeneous_fog(scene):
 
 @pytest.mark.claim("height-fog-reference", tolerance="1e-6 relative: the trapezoidal rule with 2e5 steps")
 def test_the_sun_by_steps_that_know_the_density_alone(scene):
-    truth = read_reference(scene(SUN))
-    image = quadrature_image(truth, checks=0)
-    fog, sun = fog_of(truth.medium), truth.directional[0]
-    heights = np.linspace(fog.cap, truth.origin[2], 200001)
+    reference = read_reference(scene(SUN))
+    image = quadrature_image(reference, checks=0)
+    fog, sun = fog_of(reference.medium), reference.directional[0]
+    heights = np.linspace(fog.cap, reference.origin[2], 200001)
     above = _running_sum(fog.density(heights), -heights)
     for column in (0, 11, 23):  # of the uppermost row, on which nothing casts a shadow
-        direction = truth.direction[column]
-        x = np.linspace(0, (fog.cap - truth.origin[2]) / direction[2], 200001)
-        z = np.minimum(truth.origin[2] + direction[2] * x, fog.cap)
+        direction = reference.direction[column]
+        x = np.linspace(0, (fog.cap - reference.origin[2]) / direction[2], 200001)
+        z = np.minimum(reference.origin[2] + direction[2] * x, fog.cap)
         to_sun = np.interp(z, heights[::-1], above[::-1]) / -sun.direction[2]
         depth = _running_sum(fog.density(z), x) + to_sun
-        f = fog.density(z) * np.exp(-depth) * truth.medium.phase(-sun.direction @ direction)
-        expected = np.trapezoid(f, x) * truth.medium.albedo * sun.irradiance / (4 * np.pi)
+        f = fog.density(z) * np.exp(-depth) * reference.medium.phase(-sun.direction @ direction)
+        expected = np.trapezoid(f, x) * reference.medium.albedo * sun.irradiance / (4 * np.pi)
         np.testing.assert_allclose(image.airlight[0, column], expected, rtol=1e-6)
 
 
@@ -121,14 +121,14 @@ def _flat(fog: HeightFog, sun: float) -> HeightFog:
 @pytest.mark.claim("height-fog-volpath", tolerance="1 % of the image, 95 % intervals of 40 batches")
 def test_volpath_agrees_and_injected_faults_are_found(scene):
     loaded = scene(LAMP, SUN)
-    truth = read_reference(loaded)
-    batches = [volpath_batch(truth, seed, 256) for seed in range(BATCHES)]
+    reference = read_reference(loaded)
+    batches = [volpath_batch(reference, seed, 256) for seed in range(BATCHES)]
 
     def outside(changes=()):
         with injected(*changes):
-            found = read_reference(loaded) if changes else truth
+            found = read_reference(loaded) if changes else reference
             image = quadrature_image(found, checks=0, shadow_scale=1 - measure_shadow_epsilon())
-        return [abs(bias) + half > 0.01 for bias, half in biases(truth, image, batches)]
+        return [abs(bias) + half > 0.01 for bias, half in biases(reference, image, batches)]
 
     assert not any(outside())
     for name, change in FAULTS.items():

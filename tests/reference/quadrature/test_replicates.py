@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The 95 % intervals of sums over points hold the truth in 95 % of all runs, with points chosen by the default plan.
+"""The 95 % intervals of sums over points hold the true value in 95 % of all runs, with the points of the default plan.
 
 The fast test draws the points' values from a normal law. In the others 400 runs with seeds of their own meet rays
 beside a lamp, whose airlight has a closed form, and pixels in the penumbra of a block, with a reference of 8192 points.
@@ -91,13 +91,16 @@ def check_shares(each, all_of_them, error):
 @pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a share of 400 runs, 1 % of all")
 def test_intervals_beside_a_lamp_hold(variant):
     sigma_t, radius, far = 0.21, 0.3, 2.0
-    truth = lit_room(lamp("sphere", center=[0.0, 0.0, far], radius=radius), medium=fog(sigma_t, 1.0), empty=True)
-    light = replace(truth.area[0], centre=np.array([0, 0, far]), radiance=np.ones(3))
+    reference = lit_room(lamp("sphere", center=[0.0, 0.0, far], radius=radius), medium=fog(sigma_t, 1.0), empty=True)
+    light = replace(reference.area[0], centre=np.array([0, 0, far]), radiance=np.ones(3))
     height = radius * np.array([1.2, 1.6, 3.0])
     angle = np.arcsin(height / far)
     foot = np.sqrt(far**2 - height**2)
     rays = replace(
-        truth, area=(light,), origin=np.zeros(3), direction=np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+        reference,
+        area=(light,),
+        origin=np.zeros(3),
+        direction=np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1),
     )
     closed = [sphere_airlight(sigma_t, h, radius, foot=f, x0=0.0, x1=5.0) for h, f in zip(height, foot, strict=True)]
     expected = np.array(closed) * sigma_t / (4 * np.pi)
@@ -118,15 +121,15 @@ def test_intervals_in_a_penumbra_hold(variant, layer, before):
         for k in range(9)
     }
     light = lamp(to_world=turned((0.3, 0.4, 2.9), 163, (0.5, 0.3, 1.0)))
-    truth = lit_room(light, size=(4, 3), **(blinds if before == "blinds" else {}))
-    hits = surface_hits(truth)
-    hits = replace(hits, distance=exact_distance(truth, hits.interaction, hits.distance))
+    reference = lit_room(light, size=(4, 3), **(blinds if before == "blinds" else {}))
+    hits = surface_hits(reference)
+    hits = replace(hits, distance=exact_distance(reference, hits.interaction, hits.distance))
     known = np.zeros((len(hits.distance), 3))
 
     def replicates(plan):
         if layer == "airlight":
-            return airlight_replicates(truth, plan)[:, 0]
-        return area_surface(truth, hits, beams_of(truth, hits.distance), known, plan=plan)[:, 0]
+            return airlight_replicates(reference, plan)[:, 0]
+        return area_surface(reference, hits, beams_of(reference, hits.distance), known, plan=plan)[:, 0]
 
     fine = replicates(fixed(8192, seed=RUNS))
     lit = fine.mean(axis=1) > 0

@@ -50,32 +50,32 @@ def close(image, wanted):
 
 @pytest.mark.claim("sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most")
 def test_in_height_fog_it_is_the_exponential_integral(variant, tmp_path):
-    truth = reference_of(tmp_path, LAYERED, SKY)
+    reference = reference_of(tmp_path, LAYERED, SKY)
     with pytest.raises(InputError, match=r"bounding box is not valid|light paths of a sun or a sky end within the fog"):
-        volpath_batch(truth, 0, 64)  # there are no shapes, whose size says how far a sky is
+        volpath_batch(reference, 0, 64)  # there are no shapes, whose size says how far a sky is
     x = np.linspace(0, 400, 200_001)
     wanted = []
-    for direction in truth.direction:
-        z = truth.origin[2] + x * direction[2]
+    for direction in reference.direction:
+        z = reference.origin[2] + x * direction[2]
         sigma_t = np.where((z > FLOOR) & (z < CAP), LAYER["sigma_1"] * np.exp(-(z - LAYER["z_1"]) / LAYER["H_1"]), 0.0)
         left = np.exp(-cumulative_simpson(sigma_t, x=x, initial=0))
         whole = LAYER["sigma_1"] * LAYER["H_1"]
         column = [whole * np.exp(-(end - LAYER["z_1"]) / LAYER["H_1"]) for end in (z, CAP, FLOOR)]
         above, below = np.maximum(column[0] - column[1], 0), np.maximum(column[2] - column[0], 0)
         wanted.append(simpson(sigma_t * left * 0.5 * (expn(2, above) + expn(2, below)), x=x))
-    close(quadrature_image(truth, plan=PointPlan(most=32)), ALBEDO * RADIANCE[0] * np.array(wanted))
+    close(quadrature_image(reference, plan=PointPlan(most=32)), ALBEDO * RADIANCE[0] * np.array(wanted))
 
 
 @pytest.mark.claim("sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most")
 def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
-    truth = reference_of(tmp_path, HOMOGENEOUS, SKY, BALL.format(RADIUS), camera="")
+    reference = reference_of(tmp_path, HOMOGENEOUS, SKY, BALL.format(RADIUS), camera="")
 
     def arriving(r):
         return quad(lambda mu: np.exp(SIGMA_T * (r * mu - np.sqrt(RADIUS**2 - r**2 * (1 - mu**2)))), -1, 1)[0] / 2
 
     def airlight(direction):
-        foot = -truth.origin @ direction
-        half = RADIUS**2 - truth.origin @ truth.origin + foot**2
+        foot = -reference.origin @ direction
+        half = RADIUS**2 - reference.origin @ reference.origin + foot**2
         if half <= 0:
             return 0.0
         half = np.sqrt(half)
@@ -86,9 +86,9 @@ def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
 
         return quad(scattered, -half, half)[0]
 
-    wanted = ALBEDO * RADIANCE[0] * np.array([airlight(direction) for direction in truth.direction])
+    wanted = ALBEDO * RADIANCE[0] * np.array([airlight(direction) for direction in reference.direction])
     assert (wanted > 0).sum() > 8
-    close(quadrature_image(truth, plan=PointPlan(most=32)), wanted)
+    close(quadrature_image(reference, plan=PointPlan(most=32)), wanted)
 
 
 @pytest.mark.claim("sky-light", tolerance="exactly nothing")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent are read as they are, and what has no truth is refused by the name of its shape."""
+"""Lights with extent are read as they are, and what has no reference is refused by the name of its shape."""
 
 import mitsuba as mi
 import numpy as np
@@ -89,6 +89,6 @@ MESSAGES = "is a cylinder, texture, no area, sheared, different scales, holds th
 
 
 @pytest.mark.parametrize("message", MESSAGES.split(", "))
-def test_what_has_no_truth_is_refused_by_name(variant, message):
+def test_what_has_no_reference_is_refused_by_name(variant, message):
     with pytest.raises(InputError, match=f"light 'lamp'.*{message}.*; wanted"):
         read_reference(lit_scene(lamp=refused()[message]))

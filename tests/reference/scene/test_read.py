@@ -12,20 +12,20 @@ from tests.helpers.scenes import spot, tiny_scene
 
 
 def test_both_sides_read_the_same_scene(variant):
-    """The truth and the methods under test read a scene by routes of their own; the numbers must be the same."""
+    """The reference and the methods under test read a scene by routes of their own; the numbers must be the same."""
     fog = tiny_scene()["fog"] | {"scale": 1.7, "phase": {"type": "hg", "g": -0.31}}
     scene = mi.load_dict(tiny_scene(fog=fog, spot=spot(cutoff=31.0, beam=17.0)))
-    truth, other = read_reference(scene), read_scene(scene, "double")
-    assert np.array(other.camera.origin).ravel() == pytest.approx(truth.origin)
-    direction = np.array(ray_directions(other.camera, mi.UInt32(np.arange(truth.width * truth.height)))[0]).T
-    assert np.max(np.abs(direction - truth.direction)) < 1e-14
-    assert float(other.medium.sigma_t[0][0]) == pytest.approx(truth.medium.sigma_t[0], rel=1e-6)
-    assert np.array(other.medium.albedo).ravel() == pytest.approx(truth.medium.albedo, rel=1e-6)
-    assert truth.medium.phase.g == pytest.approx(-0.31)
-    for mine, theirs in zip(truth.lights, other.lights, strict=True):
+    reference, other = read_reference(scene), read_scene(scene, "double")
+    assert np.array(other.camera.origin).ravel() == pytest.approx(reference.origin)
+    direction = np.array(ray_directions(other.camera, mi.UInt32(np.arange(reference.width * reference.height)))[0]).T
+    assert np.max(np.abs(direction - reference.direction)) < 1e-14
+    assert float(other.medium.sigma_t[0][0]) == pytest.approx(reference.medium.sigma_t[0], rel=1e-6)
+    assert np.array(other.medium.albedo).ravel() == pytest.approx(reference.medium.albedo, rel=1e-6)
+    assert reference.medium.phase.g == pytest.approx(-0.31)
+    for mine, theirs in zip(reference.lights, other.lights, strict=True):
         assert mine.position == pytest.approx(np.array(theirs.position).ravel(), rel=1e-6)
         assert mine.intensity == pytest.approx(np.array(theirs.intensity).ravel(), rel=1e-6)
-    cone = truth.lights[1]
+    cone = reference.lights[1]
     assert cone.axis == pytest.approx(np.array(other.lights[1].axis).ravel(), abs=1e-6)
     assert np.rad2deg([cone.cutoff, cone.beam]) == pytest.approx([31, 17])
 
@@ -39,12 +39,12 @@ def test_rays_are_those_of_mitsuba(variant, principal):
     for axis, offset in zip("xy", principal):
         parameters[f"principal_point_offset_{axis}"] = offset
     parameters.update()
-    truth = read_reference(scene)
+    reference = read_reference(scene)
     position = pixel_centres(size)
     film = mi.Point2f(*(position / size).T)
     ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, film, mi.Point2f(0.5))
-    assert np.max(np.abs(np.array(ray.d).T - truth.direction)) < 5e-7  # float32 matrices on Mitsuba's side
-    found = film_positions(scene.sensors()[0], np.concatenate([3 * truth.direction, -truth.direction]), size)
+    assert np.max(np.abs(np.array(ray.d).T - reference.direction)) < 5e-7  # float32 matrices on Mitsuba's side
+    found = film_positions(scene.sensors()[0], np.concatenate([3 * reference.direction, -reference.direction]), size)
     np.testing.assert_allclose(found[: len(position)], position, rtol=0, atol=1e-11)
     assert np.isnan(found[len(position) :]).all()
 

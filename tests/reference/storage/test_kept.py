@@ -81,10 +81,10 @@ def _with_root():
 
 def test_times_are_those_of_computing_and_never_of_loading():
     """What is made from kept results took as long as they once did."""
-    store("truth-a", {"a": 1}, Spent(100.0, 150.0))
+    store("reference-a", {"a": 1}, Spent(100.0, 150.0))
 
     def from_the_reference():
-        load("truth-a")
+        load("reference-a")
         add_spent(Spent(1000.0, 0.0))  # in another process
         return {"b": 2}
 

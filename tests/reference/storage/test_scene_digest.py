@@ -48,7 +48,7 @@ CHANGES = {
 
 
 def test_every_change_of_a_scene_changes_its_digest(variant):
-    """A key that does not change would answer with the truth of another scene."""
+    """A key that does not change would answer with the reference of another scene."""
     digests = {name: scene_digest(make()) for name, make in CHANGES.items()}
     assert len(set(digests.values())) == len(CHANGES)
     assert digests["nothing"] == scene_digest(load())

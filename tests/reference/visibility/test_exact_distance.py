@@ -13,12 +13,12 @@ from tests.helpers.scenes import tiny_scene
 
 
 def test_distance_to_a_plane_is_exact(variant):
-    truth = read_reference(mi.load_dict(tiny_scene(ball=None)))
-    hits = surface_hits(truth)
-    distance = exact_distance(truth, hits.interaction, hits.distance)
+    reference = read_reference(mi.load_dict(tiny_scene(ball=None)))
+    hits = surface_hits(reference)
+    distance = exact_distance(reference, hits.interaction, hits.distance)
     met = np.isfinite(hits.distance)
     assert met.sum() > 50
-    assert distance[met] == pytest.approx((-truth.origin[2] / truth.direction[:, 2])[met], rel=1e-14)
+    assert distance[met] == pytest.approx((-reference.origin[2] / reference.direction[:, 2])[met], rel=1e-14)
     assert np.isinf(distance[~met]).all()
 
 
@@ -26,13 +26,13 @@ def test_distance_to_a_plane_is_exact(variant):
 def test_distance_to_a_sphere_is_exact(variant, inside):
     """The points lie on the sphere in float64, and they are those that were cast."""
     sphere = {"type": "sphere", "center": [0.1, -3.9, 1.2], "radius": 1.9} if inside else tiny_scene()["ball"]
-    truth = read_reference(mi.load_dict(tiny_scene(ball=sphere, floor=None)))
-    hits = surface_hits(truth)
-    distance = exact_distance(truth, hits.interaction, hits.distance)
+    reference = read_reference(mi.load_dict(tiny_scene(ball=sphere, floor=None)))
+    hits = surface_hits(reference)
+    distance = exact_distance(reference, hits.interaction, hits.distance)
     met = np.isfinite(hits.distance)
     assert met.all() if inside else 5 < met.sum() < 100
-    shapes = read_shapes(truth.occluders)
-    point = truth.origin + distance[met, None] * truth.direction[met]
+    shapes = read_shapes(reference.occluders)
+    point = reference.origin + distance[met, None] * reference.direction[met]
     assert np.linalg.norm(point - shapes.centre, axis=1) == pytest.approx(shapes.radius.item(), rel=1e-14)
     assert distance[met] == pytest.approx(hits.distance[met], rel=1e-5)
     assert np.isinf(distance[~met]).all()

@@ -57,7 +57,7 @@ PLACES = {
 }
 
 
-@pytest.mark.claim("directional-truth", "exact-shadows")
+@pytest.mark.claim("directional-reference", "exact-shadows")
 @pytest.mark.parametrize("place", PLACES)
 def test_random_points_by_the_definition(variant, place):
     """Triangles, spheres and disks all around: points far from an edge are lit or not, by a test of each shape."""
@@ -110,7 +110,7 @@ def test_no_shape_in_the_light_is_left_out(variant, radius, w):
     assert some.high == pytest.approx(full.high, abs=1e-12)
 
 
-@pytest.mark.claim("directional-truth", tolerance="1e-13")
+@pytest.mark.claim("directional-reference", tolerance="1e-13")
 def test_one_triangle_in_closed_form(variant):
     """Light, triangle and ray in one plane: z - y cot for the corners, the crossing where it goes through the ray."""
     direction = np.array([[1.0, 0, 0]])
@@ -150,8 +150,8 @@ def test_a_slit_of_a_billionth_is_found(variant):
 
 
 def setup(scene):
-    truth = read_reference(mi.load_dict(scene))
-    return truth, *rays_of(truth)
+    reference = read_reference(mi.load_dict(scene))
+    return reference, *rays_of(reference)
 
 
 @pytest.mark.claim("exact-shadows")
@@ -164,36 +164,36 @@ def test_other_shapes_are_refused(variant):
 @pytest.mark.claim("shadow-ray-certificate")
 def test_the_certificate_is_clean_and_notices_a_fault(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
-    truth, rays, ends, known = setup(box_scene())
+    reference, rays, ends, known = setup(box_scene())
     right = lit_intervals(rays, ends, known)
     assert right.random_checks.checked == 32 * np.sum(ends[1] > ends[0])
     assert right.random_checks.left == 0
     assert right.random_checks.missed < 1e-3
     assert right.edge == EXACT_EDGE
     fewer = replace(known.shapes, triangles=known.shapes.triangles[12:])
-    near = near_shapes(known.light, truth.origin, truth.direction, ends[1], fewer)
+    near = near_shapes(known.light, reference.origin, reference.direction, ends[1], fewer)
     wrong = lit_intervals(rays, ends, replace(known, shapes=fewer, near=near), checks=0)
-    checked = certified(wrong, rays, ends, occluders=truth.occluders, shapes=known.shapes, checks=16)
+    checked = certified(wrong, rays, ends, occluders=reference.occluders, shapes=known.shapes, checks=16)
     assert checked.random_checks.left > 20
     assert len(checked.doubt[0]) == checked.random_checks.left
 
 
 @pytest.mark.claim("shadow-ray-certificate")
 def test_doubt_widens_the_bound(variant, monkeypatch):
-    truth, rays, _, _ = setup(box_scene())
-    light = truth.lights[0]
-    plain = quadrature.ray_values(truth)
+    reference, rays, _, _ = setup(box_scene())
+    light = reference.lights[0]
+    plain = quadrature.ray_values(reference)
     compute = light_airlight.lit_intervals
 
     def doubtful(*arguments, **settings):
         return replace(compute(*arguments, **settings), doubt=(np.array([5]), np.array([1e-3])))
 
     monkeypatch.setattr(light_airlight, "lit_intervals", doubtful)
-    doubted = quadrature.ray_values(truth)
+    doubted = quadrature.ray_values(reference)
     assert np.array_equal(doubted.airlight, plain.airlight)
     assert np.flatnonzero((doubted.bound > plain.bound).any(axis=1)).tolist() == [5]
     # In theta the integrand is exp(-sigma_t (x + r)) p/h: a milliradian, if it were lit, is worth no more than this.
-    most = truth.medium.albedo * truth.medium.sigma_t * light.intensity / (4 * np.pi) * 1e-3 / rays.height[5]
+    most = reference.medium.albedo * reference.medium.sigma_t * light.intensity / (4 * np.pi) * 1e-3 / rays.height[5]
     assert doubted.bound[5] - plain.bound[5] == pytest.approx(most, rel=1e-9)
 
 

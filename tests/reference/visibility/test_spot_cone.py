@@ -33,13 +33,13 @@ def test_interval_against_sampling(degrees):
 @pytest.mark.claim("spot-falloff", tolerance="2e-5: acos of a float32 cosine")
 def test_profile_is_that_of_mitsuba(variant):
     scene = mi.load_dict(tiny_scene(lamp=spot(cutoff=37.0, beam=14.0)))
-    truth = read_reference(scene)
-    light = truth.lights[0]
-    rays = rays_at(truth.origin, truth.direction, light.position)
+    reference = read_reference(scene)
+    light = reference.lights[0]
+    rays = rays_at(reference.origin, reference.direction, light.position)
     normal = rays.normal
     theta = np.linspace(-1.3, 1.3, 57)
     value = falloff(np.broadcast_to(theta, (len(normal), 57)), rays, light)
-    away = truth.direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
+    away = reference.direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
     interaction = dr.zeros(mi.Interaction3f, away[..., 0].size)
     interaction.p = mi.Point3f((light.position + away).reshape(-1, 3).T)
     _, arriving = scene.emitters()[0].sample_direction(interaction, mi.Point2f(0.5))

@@ -60,8 +60,8 @@ def test_segments_are_blocked_as_rays_are(variant):
 
 
 @pytest.mark.claim("shadow-rays-start-off-the-surface")
-def test_the_truth_of_a_renderer_with_an_epsilon_has_its_edges(variant):
-    """A camera that sees nothing but the band between the two edges: lit in the truth, dark for such a renderer."""
+def test_the_reference_of_a_renderer_with_an_epsilon_has_its_edges(variant):
+    """A camera that sees nothing but the band between the two edges: lit in the reference, dark for such a renderer."""
     to_roof = mi.ScalarTransform4f().translate([-2, 0, 1]).scale([2, 3, 1])
     camera = mi.ScalarTransform4f().look_at(
         origin=[-0.5 + NEAR, 0.1, 0.4], target=[-0.5 + NEAR, 0.1, 0.0], up=[0, 1, 0]
@@ -75,6 +75,6 @@ def test_the_truth_of_a_renderer_with_an_epsilon_has_its_edges(variant):
         light={"type": "point", "position": LIGHT.tolist(), "intensity": 3.0},
     )
     scene["sensor"] = scene["sensor"] | {"to_world": camera}
-    truth = read_reference(mi.load_dict(scene))
-    assert quadrature_image(truth).surface.min() > 0
-    assert np.all(quadrature_image(truth, shadow_scale=0.999).surface == 0)
+    reference = read_reference(mi.load_dict(scene))
+    assert quadrature_image(reference).surface.min() > 0
+    assert np.all(quadrature_image(reference, shadow_scale=0.999).surface == 0)

@@ -77,58 +77,58 @@ def test_a_function_of_ones_own_is_a_method(variant):
         airlight.render("open-fog", gone, size=TINY)
 
 
-# The truth
+# The reference
 
 
-def test_the_truth_with_its_bound(variant, own_cache):
+def test_the_reference_with_its_bound(variant, own_cache):
     told = []
     scene = airlight.load_scene("sphere-spot", TINY)
-    truth = airlight.reference(scene, progress=lambda share, what: told.append((share, what)))
-    np.testing.assert_array_equal(truth.airlight, reference_image(scene.scene).airlight)
-    assert truth.bound.shape == truth.airlight.shape == (12, 16, 3)
-    assert truth.airlight.dtype == np.float64
-    assert truth.standard_error is truth.surface_standard_error is None
-    assert truth.relative_error == pytest.approx(float(truth.bound.mean() / truth.airlight.mean()))
-    assert truth.details["left"] == 0
+    reference = airlight.reference(scene, progress=lambda share, what: told.append((share, what)))
+    np.testing.assert_array_equal(reference.airlight, reference_image(scene.scene).airlight)
+    assert reference.bound.shape == reference.airlight.shape == (12, 16, 3)
+    assert reference.airlight.dtype == np.float64
+    assert reference.standard_error is reference.surface_standard_error is None
+    assert reference.relative_error == pytest.approx(float(reference.bound.mean() / reference.airlight.mean()))
+    assert reference.details["left"] == 0
     assert told[-1] == (1.0, "quadrature")
-    assert np.isfinite(truth.depth).any()
+    assert np.isfinite(reference.depth).any()
 
 
-def test_a_truth_by_samples_with_its_standard_error(variant):
+def test_a_reference_by_samples_with_its_standard_error(variant):
     traced = airlight.reference("open-fog", "single-scatter", size=TINY, samples=64, seed=7)
-    truth = airlight.reference("open-fog", size=TINY)
+    reference = airlight.reference("open-fog", size=TINY)
     assert traced.bound is None
     assert traced.details["spp"] == 64
     assert traced.details["seeds"].startswith("7")
     assert 0 < traced.relative_error < 0.1
-    compared = airlight.compare(traced, truth, margin=0.1)
+    compared = airlight.compare(traced, reference, margin=0.1)
     assert compared.statistics.equivalent
     assert compared.passed
     # Student's law for 32 batches: one of 576 values is beyond 8 standard errors with a probability of 3e-6.
-    assert np.max(np.abs(traced.airlight - truth.airlight) / traced.standard_error) < 8
+    assert np.max(np.abs(traced.airlight - reference.airlight) / traced.standard_error) < 8
 
 
 # Comparisons
 
 
 def test_images_files_and_arrays_compare_alike(variant, tmp_path):
-    truth = airlight.reference("sphere-spot", size=TINY)
+    reference = airlight.reference("sphere-spot", size=TINY)
     frame = airlight.render("sphere-spot", "ray-march", size=TINY, steps=16)
-    reference_file, frame_file = truth.save(tmp_path / "truth.exr"), frame.save(tmp_path / "frame.exr")
-    direct = airlight.compare(truth, frame)
-    assert direct.metrics == airlight.error_metrics(truth.airlight, frame.airlight)
-    assert airlight.compare(truth.airlight, frame.airlight).metrics == direct.metrics
-    assert airlight.compare(truth, airlight.read_exr(frame_file)).metrics == direct.metrics
+    reference_file, frame_file = reference.save(tmp_path / "reference.exr"), frame.save(tmp_path / "frame.exr")
+    direct = airlight.compare(reference, frame)
+    assert direct.metrics == airlight.error_metrics(reference.airlight, frame.airlight)
+    assert airlight.compare(reference.airlight, frame.airlight).metrics == direct.metrics
+    assert airlight.compare(reference, airlight.read_exr(frame_file)).metrics == direct.metrics
     # A file keeps float32.
     files = airlight.compare(reference_file, frame_file)
     assert files.metrics.relative_rmse == pytest.approx(direct.metrics.relative_rmse, rel=1e-5)
-    assert files.names == ("truth.exr", "frame.exr")
-    total = airlight.compare(truth, frame, "total")
-    assert total.metrics == airlight.error_metrics(truth.total, frame.total)
+    assert files.names == ("reference.exr", "frame.exr")
+    total = airlight.compare(reference, frame, "total")
+    assert total.metrics == airlight.error_metrics(reference.total, frame.total)
     mask = np.zeros((12, 16), bool)
     mask[4:8] = True
-    assert airlight.compare(truth, frame, mask=mask).masked == 192 - 64
-    assert airlight.compare(truth, frame, all_metrics=True).colour.ciede2000_mean > 0
+    assert airlight.compare(reference, frame, mask=mask).masked == 192 - 64
+    assert airlight.compare(reference, frame, all_metrics=True).colour.ciede2000_mean > 0
 
 
 # Mistakes

@@ -27,12 +27,12 @@ def rendering(scale=1.0, dtype=np.float32, **fields):
     return Rendering(scene="<made & up>", image=image, method="slow", **(made | fields))
 
 
-def truth(**more):
+def reference(**more):
     image = sealed(layered(dtype=np.float64, **more))
     return Reference(scene="<made & up>", image=image, estimator="quadrature", relative_error=1e-9)
 
 
-RESULTS = {"rendering": rendering, "reference": truth, "comparison": lambda: compare(truth(), rendering(1.01))}
+RESULTS = {"rendering": rendering, "reference": reference, "comparison": lambda: compare(reference(), rendering(1.01))}
 
 
 @pytest.mark.claim("results-are-frozen")

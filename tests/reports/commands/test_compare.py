@@ -19,14 +19,14 @@ SHAPE = (16, 20, 3)
 def files(tmp_path):
     """Write a reference with standard errors of 2 %, a test image that is 1 % too bright, and a mask."""
     rng = np.random.default_rng(4)
-    truth = rng.gamma(2.0, 0.3, SHAPE)
-    error = 0.02 * truth
-    layers = {"airlight": truth + error * rng.standard_normal(SHAPE), "airlight_se": error}
+    reference = rng.gamma(2.0, 0.3, SHAPE)
+    error = 0.02 * reference
+    layers = {"airlight": reference + error * rng.standard_normal(SHAPE), "airlight_se": error}
     mask = np.ones(SHAPE)
     mask[:2] = 0
     for name, image in (
         ("reference", Image(layers, attributes={"airlight:batches": 32})),
-        ("test", Image({"airlight": 1.01 * truth})),
+        ("test", Image({"airlight": 1.01 * reference})),
         ("mask", Image({"total": mask})),
     ):
         write_exr(tmp_path / f"{name}.exr", image)
@@ -58,7 +58,7 @@ def test_everything_at_once(files, capsys):
 
 @pytest.mark.claim("engine-margin", "scenes-stand-first")
 def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
-    """The truth is found at the size of the file; upside down it is suspected, and the margin decides."""
+    """The reference is found at the size of the file; upside down it is suspected, and the margin decides."""
     path, difference = tmp_path / "open-fog.exr", tmp_path / "difference.exr"
     airlight = reference_image(load_scene("open-fog", (32, 24)).scene).airlight
     write_exr(path, Image({"airlight": airlight}))

@@ -32,7 +32,7 @@ def traced(variant, monkeypatch):
     """Draw batches in the place of tracing them; a seed that is listed is where Ctrl-C comes."""
     stops = []
 
-    def trace(truth, seed, samples, **options):
+    def trace(reference, seed, samples, **options):
         if seed in stops:
             raise KeyboardInterrupt
         # Of one pixel the standard deviation is its mean, so that the image is known to 1/sqrt(144 batches).

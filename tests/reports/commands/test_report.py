@@ -172,7 +172,7 @@ def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     (folder / "report.json").write_text(json.dumps(report_data()), encoding="utf-8")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "again"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(report_text(small_report()))
-    assert "The truth is confirmed." in (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
+    assert "The reference is confirmed." in (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
     assert json.loads((tmp_path / "again" / "report.json").read_text(encoding="utf-8")) == report_data()
     (folder / next(name for name in named_files(small_report()) if name.endswith(".png"))).write_bytes(b"half a file")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "third")]) == 2
@@ -186,9 +186,9 @@ def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys)
     from validation.estimates.quadrature import reference_image
     from validation.scenes.loading import load_scene
 
-    truth = reference_image(load_scene("open-fog", (32, 24)).scene)
+    reference = reference_image(load_scene("open-fog", (32, 24)).scene)
     for name, factor in (("a", 1.0), ("b", 0.9)):
-        write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * truth.airlight}))
+        write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * reference.airlight}))
     area = reference_image(load_scene("open-fog", (32, 24)).scene, pixel="area")
     write_exr(images / "open-fog.means.exr", Image({"total": area.airlight}))
     options = ["open-fog", "--method", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]

@@ -26,7 +26,7 @@ from tests.helpers.reports import (
     settings,
     timing,
 )
-from tests.helpers.reports import truth as reference_of
+from tests.helpers.reports import reference as reference_of
 
 _SIZE = (24, 32)  # height, width
 _WRONG = {"sound": 1e-6, "march (steps=8)": 0.02}
@@ -41,13 +41,13 @@ def method(label, error, **changes):
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    truth = 0.5 + np.random.default_rng(3).random((*_SIZE, 3))
-    write_exr(folder / "reference.exr", Image({"airlight": truth}))
+    reference = 0.5 + np.random.default_rng(3).random((*_SIZE, 3))
+    write_exr(folder / "reference.exr", Image({"airlight": reference}))
     methods = []
     for name in ("reference.png", "reference-airlight.png"):
         Picture.new("RGB", (32, 24)).save(folder / name)
     for label, error in _WRONG.items():
-        wrong = truth * (1 + error)
+        wrong = reference * (1 + error)
         wrong[2:6, 20:24] *= 1.5 if error > 1e-3 else 1.0
         write_exr(folder / f"{label[:5]}.exr", Image({"airlight": wrong}))
         methods.append(method(label, error, files={"exr": f"{label[:5]}.exr"}))

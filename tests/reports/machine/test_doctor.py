@@ -61,7 +61,7 @@ def test_a_kernel_that_crashes_is_shown_and_crashes_nothing(code, words, monkeyp
 
 @pytest.fixture
 def filled(own_cache):
-    for kind in ("quadrature", "report-truth", "report-method"):
+    for kind in ("quadrature", "report-reference", "report-method"):
         for number in range(2):
             store_arrays(f"{kind}-{number:032x}", {"a": np.zeros(2000)})
     return own_cache
@@ -76,7 +76,7 @@ def test_the_cache_is_shown_and_cleared(filled, monkeypatch):
     assert {kind: of["files"] for kind, of in shown["kinds"].items()} == {
         "quadrature": 2,
         "report-method": 2,
-        "report-truth": 2,
+        "report-reference": 2,
     }
     cleared = doctor.doctor(clear_cache=True)
     assert (cleared.cache["removed"], cleared.cache["freed"], cleared.cache["files"]) == (6, size, 0)

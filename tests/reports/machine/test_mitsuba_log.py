@@ -29,9 +29,9 @@ end_header
     [
         ["describe"],
         ["render", "--method", "unshadowed", "-o", "frame.exr"],
-        ["reference", "-o", "truth.exr"],
+        ["reference", "-o", "reference.exr"],
         ["reference", "-o", "sampled.exr", "--estimator", "single-scatter", "--samples", "64"],
-        ["compare", "truth.exr"],
+        ["compare", "reference.exr"],
     ],
     ids=lambda order: "-".join(order[:1] + order[-1:]),
 )
@@ -45,7 +45,7 @@ def test_json_is_all_that_is_printed(variant, tmp_path, monkeypatch, capfd, orde
     (tmp_path / f"{name}.ply").write_text(HEAD.format(3000) + "".join(vertices) + "3 0 1 2\n3 0 0 1\n")
     (tmp_path / "own.xml").write_text(SCENE.format(name))
     if order[0] == "compare":
-        assert run(["reference", "own.xml", "-o", "truth.exr"]) == 0
+        assert run(["reference", "own.xml", "-o", "reference.exr"]) == 0
         capfd.readouterr()
     status = run([order[0], "own.xml", *order[1:], "--json"])
     printed = capfd.readouterr()

@@ -124,11 +124,11 @@ def test_missing_values_are_dashes_and_failures_are_marked(data, folder):
     scene["methods"] += [refused("bad", "no series"), engine_image()]
     scene["agreement"]["airlight"]["statistics"] |= {"relative_bias": None, "relative_bias_ci": [None, None]}
     scene["agreement"]["surface"]["statistics"] |= {"equivalent": False}
-    data["claims"] = [{"kind": "reference", "text": "The truth is NOT confirmed.", "good": False}]
+    data["claims"] = [{"kind": "reference", "text": "The reference is NOT confirmed.", "good": False}]
     page = render(data, folder)
     assert "None" not in page.text
     assert "nan" not in page.text.lower().replace("airlight", "").split()
-    for words in (DASH, "refused: no series", "(image, total)", "does not hold: The truth is NOT confirmed."):
+    for words in (DASH, "refused: no series", "(image, total)", "does not hold: The reference is NOT confirmed."):
         assert words in page.text
     marked = [tag for tag, attributes in page.tags if "bad" in (attributes.get("class") or "").split()]
     assert {"li", "td"} <= set(marked)

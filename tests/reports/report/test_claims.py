@@ -50,7 +50,7 @@ def scenes():
 
 
 @pytest.mark.claim("claims-follow")
-def test_claims_on_a_truth_that_is_confirmed():
+def test_claims_on_a_reference_that_is_confirmed():
     assert [(claim.kind, claim.good) for claim in claims(scenes())] == [("reference", True), ("left-out", None)]
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
     assert claims([]) == []
@@ -60,7 +60,7 @@ def test_claims_on_a_truth_that_is_confirmed():
 
 
 @pytest.mark.claim("claims-follow")
-def test_claims_on_a_truth_that_is_not_confirmed():
+def test_claims_on_a_reference_that_is_not_confirmed():
     data = scenes()
     data[1]["agreement"]["surface"]["statistics"]["equivalent"] = False
     trust = texts(data)[0]
@@ -74,7 +74,7 @@ def out_of_time(interval):
     return comparison | {"finished": False}
 
 
-def test_out_of_time_is_neither_confirmed_nor_against_the_truth():
+def test_out_of_time_is_neither_confirmed_nor_against_the_reference():
     data = scenes()
     data[1]["agreement"]["airlight"] = out_of_time([-0.01, 0.004])
     first = claims(data)[0]
@@ -88,7 +88,7 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_truth():
     assert confirmed(data)
 
 
-def test_out_of_time_can_still_speak_against_the_truth():
+def test_out_of_time_can_still_speak_against_the_reference():
     data = scenes()
     data[1]["agreement"]["airlight"] = out_of_time([0.006, 0.03])
     assert verdict(record_of(data[1]["agreement"]["airlight"], Agreement)) is False

@@ -151,7 +151,7 @@ def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
 
 
 @pytest.mark.claim("report-kept")
-def test_fresh_computes_truths_and_batches_again_too(written, variant, tmp_path, monkeypatch):
+def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_path, monkeypatch):
     from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
     from reference.quadrature.image import quadrature_image
 

@@ -28,7 +28,7 @@ def test_plain_makes_what_json_can_hold():
 
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
-def test_truth_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
+def test_reference_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
     from reference.quadrature.ray_values import ReferenceImage
 
     black = np.zeros_like(airlight)

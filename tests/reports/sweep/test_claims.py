@@ -43,7 +43,7 @@ def test_what_is_no_number_misses_and_a_refusal_is_no_try(sweep_of):
 
 
 @pytest.mark.claim("sweep-tries")
-def test_scene_without_a_truth_is_no_try(sweep_of):
+def test_scene_without_a_reference_is_no_try(sweep_of):
     several = [
         row("random:0", relative_rmse=1e-5),
         row("random:1", status="hung", reason="reference of random:1 160x120: stopped after 600 s"),
@@ -57,7 +57,7 @@ def test_scene_without_a_truth_is_no_try(sweep_of):
 
 
 @pytest.mark.claim("sweep-tries")
-def test_what_the_truth_cannot_tell_widens_the_interval_on_one_side(sweep_of):
+def test_what_the_reference_cannot_tell_widens_the_interval_on_one_side(sweep_of):
     several = [row(f"random:{n}", relative_rmse=1e-4) for n in range(10)]
     several += [
         row("random:10", relative_rmse=9e-4, reference_error=2e-4),

@@ -69,7 +69,7 @@ def test_the_fastest_method_within_each_error_has_a_cell():
 @pytest.mark.parametrize(
     "never",
     [
-        entry("no error", rmse=None, frame=0.1),  # a black truth has no relative error
+        entry("no error", rmse=None, frame=0.1),  # a black reference has no relative error
         entry("refused", refused="no series", times=None, error=None),
         entry("not finite", rmse=1e-5, frame=0.1, nonfinite=3),  # its RMSE leaves out the very pixels that are wrong
         entry("image", kind="image", rmse=1e-5, times=None),

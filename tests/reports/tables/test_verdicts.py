@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tables decide: is a truth confirmed, what grew too steeply, what is wrong as published, which bar broke."""
+"""What tables decide: is a reference confirmed, what grew too steeply, what is wrong as published, which bar broke."""
 
 import pytest
 
@@ -19,7 +19,7 @@ from tests.helpers.reports import agreement, growth_record, record_of
         (False, [None, None], False, False),
     ],
 )
-def test_a_truth_is_confirmed_refused_or_not_decided(equivalent, interval, finished, good):
+def test_a_reference_is_confirmed_refused_or_not_decided(equivalent, interval, finished, good):
     compared = agreement(equivalent, margin=0.005, finished=finished, relative_bias_ci=interval)
     assert verdict(record_of(compared, Agreement)) is good
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The view of a small scene, as its command shows it, in a real browser: mouse, widgets, truth, a second tab."""
+"""The view of a small scene, as its command shows it, in a real browser: mouse, widgets, reference, a second tab."""
 
 import signal
 import subprocess

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the page asks for is shown, mistakes are one line, and the command on the page makes the same image.
 
-The truth is computed by a stand-in in this process, and at once; one slow test has the process.
+The reference is computed by a stand-in in this process, and at once; one slow test has the process.
 """
 
 import json
@@ -26,7 +26,7 @@ AIM = {"camera.origin": [0.61, -0.3, 0.4], "camera.target": [0.2, 0.1, 4.0], "ca
 
 
 class ReferenceAtOnce:
-    """A stand-in for the process of the truth; `starts` counts what it was asked for."""
+    """A stand-in for the process of the reference; `starts` counts what it was asked for."""
 
     def __init__(self, told, variant):
         self.told, self.known, self.done, self.failure, self.starts = told, None, False, "", 0
@@ -119,11 +119,11 @@ def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch
     with pytest.raises(ZeroDivisionError):
         cli.run(commands["view"])
     assert started == [session._state()]
-    assert cli.run([*commands["reference"], "-o", str(tmp_path / "truth.exr")]) == 0
+    assert cli.run([*commands["reference"], "-o", str(tmp_path / "reference.exr")]) == 0
     turns(session, lambda: session.reference.done and session._reference_of is not None)
     # float32 in the file
     np.testing.assert_allclose(
-        session.reference.known.airlight, read_exr(tmp_path / "truth.exr").layers["airlight"], rtol=1e-6
+        session.reference.known.airlight, read_exr(tmp_path / "reference.exr").layers["airlight"], rtol=1e-6
     )
 
 
@@ -136,15 +136,15 @@ def test_the_error_is_that_of_compare_and_begins_again_when_the_scene_changes(vi
     assert error["known"] == error["pixels"] == SIZE[0] * SIZE[1]
     assert 0 < error["bound"] < 1e-6
     commands = page.last("state")["commands"]
-    method, truth = str(tmp_path / "method.exr"), str(tmp_path / "truth.exr")
+    method, reference = str(tmp_path / "method.exr"), str(tmp_path / "reference.exr")
     assert cli.run([*shlex.split(commands["render"])[1:], "-o", method]) == 0
-    assert cli.run([*shlex.split(commands["reference"])[1:], "-o", truth]) == 0
+    assert cli.run([*shlex.split(commands["reference"])[1:], "-o", reference]) == 0
     capfd.readouterr()
-    assert cli.run(["compare", truth, method, "--json"]) == 0
+    assert cli.run(["compare", reference, method, "--json"]) == 0
     compared = json.loads(capfd.readouterr().out)
     assert error["relative_rmse"] == pytest.approx(compared["relative_rmse"], rel=1e-5)
     assert error["relative_bias"] == pytest.approx(compared["relative_bias"], rel=1e-4)
-    # Another method has the same truth; another scene has not.
+    # Another method has the same reference; another scene has not.
     ask(session, page, kind="choose", parameter="steps", value=21)
     turns(session, lambda: page.last("error")["error"]["relative_rmse"] < 0.5 * error["relative_rmse"])
     assert session.reference.starts == 1

@@ -27,10 +27,16 @@ def compare_files(reference, test, **options):
 def pair():
     """Return a reference with standard errors and a test image, both with the same mean."""
     rng = np.random.default_rng(9)
-    truth = rng.gamma(2.0, 0.3, SHAPE)
-    error = 0.02 * truth
-    layers = {"airlight": truth + error * rng.standard_normal(SHAPE), "airlight_se": error, "surface": 2 * truth}
-    return Image(layers, attributes={"airlight:batches": 64}), Image({"airlight": truth, "surface": 2.02 * truth})
+    reference = rng.gamma(2.0, 0.3, SHAPE)
+    error = 0.02 * reference
+    layers = {
+        "airlight": reference + error * rng.standard_normal(SHAPE),
+        "airlight_se": error,
+        "surface": 2 * reference,
+    }
+    return Image(layers, attributes={"airlight:batches": 64}), Image(
+        {"airlight": reference, "surface": 2.02 * reference}
+    )
 
 
 def test_metrics_and_statistics_of_a_layer(pair):
@@ -110,13 +116,13 @@ def written(path, layers):
 
 
 def test_layers_that_both_have_are_compared_in_their_order(tmp_path):
-    truth = written(
+    reference = written(
         tmp_path / "a.exr", {"airlight": 2.0, "airlight_31_inf": 1.0, "airlight_3_4": 0.5, "airlight_1": 0.3}
     )
     mine = written(
         tmp_path / "b.exr", {"airlight": 2.0, "airlight_31_inf": 1.5, "airlight_3_4": 0.4, "airlight_2": 9.0}
     )
-    compared = compare_files(truth, mine)
+    compared = compare_files(reference, mine)
     assert [each.layer for each in compared.orders] == ["airlight_3_4", "airlight_31_inf"]
     data = compared.to_json()
     assert [entry["layer"] for entry in data["orders"]] == ["airlight_3_4", "airlight_31_inf"]

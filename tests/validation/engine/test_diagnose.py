@@ -30,13 +30,13 @@ def diagnosed(values, scene="sphere-spot", size=SIZE, **how):
     return diagnose_image(Image({"total": values}), load_scene(scene, size), layer="total", **how)
 
 
-def total(truth, **how):
-    image = quadrature_image(truth, checks=8, **how)
+def total(reference, **how):
+    image = quadrature_image(reference, checks=8, **how)
     return image.airlight + image.surface
 
 
 @pytest.fixture(scope="module")
-def truth(variant):
+def reference(variant):
     return read_reference(load_scene("sphere-spot", SIZE).scene)
 
 
@@ -51,8 +51,8 @@ def marked(planted):
 
 @pytest.mark.claim("diagnosis-planted")
 @pytest.mark.parametrize("planted", [marked(planted) for planted in PLANTED])
-def test_a_planted_fault_comes_first(truth, planted):
-    diagnosis = diagnosed(planted.image(truth))
+def test_a_planted_fault_comes_first(reference, planted):
+    diagnosis = diagnosed(planted.image(reference))
     assert diagnosis.first == planted.name, [row.words for row in diagnosis.ranked]
     assert diagnosis.ranked[0].name == planted.name
     assert diagnosis.explained
@@ -60,19 +60,19 @@ def test_a_planted_fault_comes_first(truth, planted):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", ["the extinction 1.4 times", "upside down", "filmic", "half a pixel", "sRGB"])
-def test_a_planted_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(truth, words):
+def test_a_planted_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(reference, words):
     """The images of the test above have no noise, and it says that their pixels are centres: an engine says neither."""
     (planted,) = (each for each in PLANTED if each.words == words)
     noise = 1 + 0.01 * np.random.default_rng(6).standard_normal((SIZE[1], SIZE[0], 1))
-    assert diagnosed(planted.image(truth) * noise, pixel=None).first == planted.name
+    assert diagnosed(planted.image(reference) * noise, pixel=None).first == planted.name
 
 
 @pytest.mark.slow
-def test_a_light_that_is_off_is_named_among_many_triangles(truth, monkeypatch):
+def test_a_light_that_is_off_is_named_among_many_triangles(reference, monkeypatch):
     """There less is tried, since paths cost much."""
     monkeypatch.setattr("validation.engine.diagnose._MANY_TRIANGLES", 0)
     (planted,) = (each for each in PLANTED if each.name == "light-position")
-    diagnosis = diagnosed(planted.image(truth))
+    diagnosis = diagnosed(planted.image(reference))
     assert diagnosis.first == "light-position"
     assert diagnosis.explained
 
@@ -100,11 +100,11 @@ def test_few_pixels_tell_no_fault_from_noise(variant):
         diagnosed(np.full((3, 4, 3), 0.02), size=(4, 3))
 
 
-def test_noise_is_of_one_size_all_over_the_image(truth):
+def test_noise_is_of_one_size_all_over_the_image(reference):
     generator = np.random.default_rng(2)
     errors, pairs = 0.02 * generator.standard_normal((400, 3)), (np.arange(399), np.arange(1, 400))
     lit = np.ones(errors.shape, bool)
-    explanation = Explanation((), (), Guess(scene_fog(truth)), errors, lit, float(np.abs(errors).mean()))
+    explanation = Explanation((), (), Guess(scene_fog(reference)), errors, lit, float(np.abs(errors).mean()))
     assert is_noise(explanation, pairs)
     errors[::7] *= 20  # thin shadows that are off
     assert not is_noise(explanation, pairs)
@@ -112,17 +112,17 @@ def test_noise_is_of_one_size_all_over_the_image(truth):
 
 @pytest.mark.claim("diagnosis-right")
 @pytest.mark.parametrize("noise", [0.01, pytest.param(0.2, marks=pytest.mark.slow)])
-def test_no_fault_is_named_for_a_right_image(truth, noise):
+def test_no_fault_is_named_for_a_right_image(reference, noise):
     generator = np.random.default_rng(3)
-    diagnosis = diagnosed(total(truth) * (1 + noise * generator.standard_normal((SIZE[1], SIZE[0], 1))))
+    diagnosis = diagnosed(total(reference) * (1 + noise * generator.standard_normal((SIZE[1], SIZE[0], 1))))
     assert diagnosis.first == "right"
     assert diagnosis.explained
 
 
 @pytest.mark.slow
 @pytest.mark.claim("diagnosis-two")
-def test_two_faults_of_different_kinds_are_both_named(truth):
-    denser = replace(truth, medium=replace(truth.medium, sigma_t=1.6 * truth.medium.sigma_t))
+def test_two_faults_of_different_kinds_are_both_named(reference):
+    denser = replace(reference, medium=replace(reference.medium, sigma_t=1.6 * reference.medium.sigma_t))
     both = diagnosed(0.7 * total(denser))
     assert {row.name for row in both.ranked[:2]} == {"extinction", "factor"}
     assert both.ranked[0].together == ("extinction", "factor")

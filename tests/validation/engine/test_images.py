@@ -102,14 +102,14 @@ def test_colours_in_integers_are_refused_by_name(tmp_path):
 
 
 @pytest.mark.claim("engine-pixels")
-def test_the_truth_that_fits_is_taken(variant, tmp_path):
+def test_the_reference_that_fits_is_taken(variant, tmp_path):
     for pixel in ("centre", "area"):
-        truth = reference_of(pixel)
-        path = written(tmp_path, f"{pixel}.exr", total=0.999 * (truth.airlight + truth.surface))
+        reference = reference_of(pixel)
+        path = written(tmp_path, f"{pixel}.exr", total=0.999 * (reference.airlight + reference.surface))
         judged, *_ = measured(path)
         assert (judged.pixel, "means over the areas" in notes_of(judged, None)) == (pixel, pixel == "area")
         assert judged.comparison.metrics.relative_bias == pytest.approx(-0.001, abs=1e-6)
-        np.testing.assert_array_equal(judged.fit.truth.airlight, truth.airlight)
+        np.testing.assert_array_equal(judged.fit.reference.airlight, reference.airlight)
 
 
 def test_an_engine_says_how_long_its_images_took(variant, tmp_path):

@@ -44,7 +44,7 @@ def scene(tmp_path):
 
 
 @pytest.fixture
-def truth(scene, variant):
+def expected(scene, variant):
     return reference_image(load_scene(scene, (16, 12)).scene)
 
 
@@ -61,8 +61,8 @@ def write(tmp_path):
 
 
 @pytest.mark.claim("engine-layers")
-def test_airlight_is_compared_where_there_is_one(scene, truth, write):
-    verdict = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface))
+def test_airlight_is_compared_where_there_is_one(scene, expected, write):
+    verdict = compare_scene(scene, write(airlight=expected.airlight, surface=2 * expected.surface))
     assert (verdict.scene, verdict.size, verdict.expected, verdict.comparison.layer) == (
         "own",
         (16, 12),
@@ -71,13 +71,13 @@ def test_airlight_is_compared_where_there_is_one(scene, truth, write):
     assert verdict.comparison.metrics.relative_rmse < 1e-6  # the file is float32
     assert (verdict.failures, verdict.hints.words) == ((), ())
     assert 0 <= verdict.reference_error < 1e-6
-    verdict = compare_scene(scene, write(airlight=truth.airlight, surface=2 * truth.surface), layer="surface")
+    verdict = compare_scene(scene, write(airlight=expected.airlight, surface=2 * expected.surface), layer="surface")
     np.testing.assert_allclose(verdict.comparison.metrics.relative_bias, 1, rtol=1e-6)
 
 
 @pytest.mark.claim("engine-layers")
-def test_plain_channels_are_compared_with_all_light(scene, truth, write):
-    total = reference_layer(truth, "total")
+def test_plain_channels_are_compared_with_all_light(scene, expected, write):
+    total = reference_layer(expected, "total")
     for layers in ({"total": total}, {"Final__Combined": total}):
         verdict = compare_scene(scene, write(**layers))
         assert verdict.expected == "total"
@@ -86,14 +86,14 @@ def test_plain_channels_are_compared_with_all_light(scene, truth, write):
 
 
 @pytest.mark.claim("engine-margin")
-def test_margin_decides_without_standard_errors(scene, truth, write):
-    file = write(airlight=1.01 * truth.airlight)
+def test_margin_decides_without_standard_errors(scene, expected, write):
+    file = write(airlight=1.01 * expected.airlight)
     assert compare_scene(scene, file, margin=0.011).failures == ()
     (reason,) = compare_scene(scene, file, margin=0.009).failures
     assert reason == "the relative bias, +0.01, is not within +-0.009"
     with refused("margin: got 0, wanted a relative bias above 0"):
         compare_scene(scene, file, margin=0)
-    nan = truth.airlight.copy()
+    nan = expected.airlight.copy()
     nan[2, 3] = np.nan
     assert len(compare_scene(scene, write(airlight=nan), margin=0.01).failures) == 1
 
@@ -117,34 +117,34 @@ def area_lit(variant, tmp_path_factory):
 
 def test_an_area_light_in_view_is_part_of_the_total_of_an_engine_but_not_of_our_files(area_lit, write):
     """The same engine image was right in the live view and wrong in `compare` and `report --images`, or the reverse."""
-    path, loaded, truth = area_lit
-    assert truth.emitted.max() > 10 * (truth.airlight + truth.surface).max()
-    file = write(total=reference_layer(truth, "total"))
+    path, loaded, expected = area_lit
+    assert expected.emitted.max() > 10 * (expected.airlight + expected.surface).max()
+    file = write(total=reference_layer(expected, "total"))
     assert compare_scene(path, file, pixel="centre").verdict.right
     judged, *_ = measure_image(EngineImage("area", "engine", file), loaded, references(loaded), surfaces=True)
     assert judged.verdict.right
-    dark = compare_scene(path, write(total=truth.airlight + truth.surface), pixel="centre")
+    dark = compare_scene(path, write(total=expected.airlight + expected.surface), pixel="centre")
     assert not dark.verdict.right
     assert dark.hints.words == ("the image does not show the area lights that the camera sees: compare its airlight",)
-    for layers, made in (({"emitted": truth.emitted}, {}), ({}, {"airlight:scene": "area"})):
+    for layers, made in (({"emitted": expected.emitted}, {}), ({}, {"airlight:scene": "area"})):
         own = judged_layer(
-            Image({"total": truth.airlight + truth.surface, **layers}, attributes=made), "own.exr", name=""
+            Image({"total": expected.airlight + expected.surface, **layers}, attributes=made), "own.exr", name=""
         )
-        np.testing.assert_array_equal(expected_layer(truth, own), own.values)
+        np.testing.assert_array_equal(expected_layer(expected, own), own.values)
     # Neither a fit nor a diagnosis explains the radiance of the light itself.
     image = read_exr(file)
     left = seen_image(image, judged_layer(image, file), loaded.scene)[0].used
     assert 0.7 < left.mean() < 1
-    assert not left.reshape(12, 16)[truth.emitted.any(axis=2)].any()
+    assert not left.reshape(12, 16)[expected.emitted.any(axis=2)].any()
 
 
 @pytest.mark.claim("engine-margin", tolerance="1e-5: files are float32")
 @pytest.mark.parametrize("layer", ["airlight", "total"])
 def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path, area_lit, write, layer):
     """Under an area light, `compare SCENE IMAGE` says what `compare REFERENCE.exr IMAGE` says; it left them out."""
-    path, _, truth = area_lit
-    values = reference_layer(truth, layer)
-    errors = reference_error(truth, layer)
+    path, _, expected = area_lit
+    values = reference_layer(expected, layer)
+    errors = reference_error(expected, layer)
     sure = np.full(values.shape, 1e-5 * values.mean())  # an image that is surer than the reference
     image = {layer: values + 1e-4 * values.mean(), f"{layer}_se": sure}
     reference = tmp_path / "reference.exr"
@@ -155,7 +155,7 @@ def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path,
     assert by_scene.reference_variance_share == pytest.approx(by_file.reference_variance_share, rel=1e-5)
     assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
     assert by_file.reference_variance_share > 0.9
-    assert compared.reference_error > truth.airlight_se.mean() / truth.airlight.mean()
+    assert compared.reference_error > expected.airlight_se.mean() / expected.airlight.mean()
 
 
 @pytest.mark.parametrize("size", [(32, 24), (64, 48), (31, 23), (1, 1)])
@@ -170,10 +170,10 @@ def test_another_aspect_is_refused_with_the_scenes_own(scene, variant, size):
         scene_of_size(scene, size, "engine.exr")
 
 
-def test_layers_that_are_not_there_are_refused(scene, truth, write):
-    total = reference_layer(truth, "total")
+def test_layers_that_are_not_there_are_refused(scene, expected, write):
+    total = reference_layer(expected, "total")
     with refused("has no layer 'airlihgt'"):
-        compare_scene(scene, write(airlight=truth.airlight), layer="airlihgt")
+        compare_scene(scene, write(airlight=expected.airlight), layer="airlihgt")
     file = write(A__Combined=total, B__Combined=total)
     with refused("it has A.Combined, B.Combined; name one by --layer"):
         compare_scene(scene, file)
@@ -205,12 +205,12 @@ def traced(request, variant, tmp_path_factory):
     Every value has Gaussian noise of 2 %, those beside the lamp of 30 %, as LuxCore's had at 512 paths a pixel, and the
     pixel of the lamp is twice as bright as it should be: its variance is infinite.
     """
-    truth = reference_image(load_scene(request.param, SIZE).scene, pixel="area")
-    total = reference_layer(truth, "total")
-    beside = truth.light_angle < 3 * np.deg2rad(58 / SIZE[0])
+    expected = reference_image(load_scene(request.param, SIZE).scene, pixel="area")
+    total = reference_layer(expected, "total")
+    beside = expected.light_angle < 3 * np.deg2rad(58 / SIZE[0])
     noise = np.where(beside, 0.3, 0.02)[:, :, None] * np.random.default_rng(7).standard_normal((*total.shape[:2], 1))
-    noise[np.unravel_index(truth.light_angle.argmin(), truth.light_angle.shape)] += 1.0 if beside.any() else 0.0
-    return request.param, truth, np.maximum(1 + noise, 0) * total, tmp_path_factory.mktemp("traced")
+    noise[np.unravel_index(expected.light_angle.argmin(), expected.light_angle.shape)] += 1.0 if beside.any() else 0.0
+    return request.param, expected, np.maximum(1 + noise, 0) * total, tmp_path_factory.mktemp("traced")
 
 
 def compared(traced, image):
@@ -246,23 +246,26 @@ def moved(image):
 
 
 FAULTS = {
-    "pi": (lambda image, truth: np.pi * image, "(pi), +1.65 stops"),
-    "a factor of 3 %": (lambda image, truth: 1.03 * image, "the best factor is 0.97"),
-    "upside down": (lambda image, truth: image[::-1], "upside down"),
-    "a gamma": (lambda image, truth: image ** (1 / 2.2), ""),
-    "a pixel too low": (lambda image, truth: moved(image), "off"),
-    "a haze of 5 %": (lambda image, truth: image + 0.05 * image.mean(), "off"),
-    "fog that ends": (lambda image, truth: image - 0.1 * truth.airlight * (np.arange(SIZE[0]) < 30)[:, None], "off"),
-    "black": (lambda image, truth: 0 * image, "the image is black everywhere"),
+    "pi": (lambda image, expected: np.pi * image, "(pi), +1.65 stops"),
+    "a factor of 3 %": (lambda image, expected: 1.03 * image, "the best factor is 0.97"),
+    "upside down": (lambda image, expected: image[::-1], "upside down"),
+    "a gamma": (lambda image, expected: image ** (1 / 2.2), ""),
+    "a pixel too low": (lambda image, expected: moved(image), "off"),
+    "a haze of 5 %": (lambda image, expected: image + 0.05 * image.mean(), "off"),
+    "fog that ends": (
+        lambda image, expected: image - 0.1 * expected.airlight * (np.arange(SIZE[0]) < 30)[:, None],
+        "off",
+    ),
+    "black": (lambda image, expected: 0 * image, "the image is black everywhere"),
 }
 
 
 @pytest.mark.claim("engine-verdict")
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_not_called_right(traced, fault):
-    _, truth, image, _ = traced
+    _, expected, image, _ = traced
     change, words = FAULTS[fault]
-    judged = compared(traced, change(image, truth))
+    judged = compared(traced, change(image, expected))
     assert not judged.verdict.right
     assert words in judged.verdict.words
     assert judged.summary().splitlines()[-1].startswith("verdict          not right: ")
@@ -270,51 +273,51 @@ def test_planted_faults_are_not_called_right(traced, fault):
 
 @pytest.mark.claim("engine-verdict", tolerance="1e-12 relative")
 def test_the_place_of_the_error_is_that_of_the_worst_pixels():
-    truth = np.ones((20, 30, 3))
-    image = truth.copy()
+    expected = np.ones((20, 30, 3))
+    image = expected.copy()
     image[7, 11] += 3
     image[0, 0] += 0.03
     lamp = np.full((20, 30), 50.0)
     lamp[6:9, 10:13] = 1
-    place = error_place(truth, image, lamp)
+    place = error_place(expected, image, lamp)
     assert (place.pixels, place.worst, place.kind, place.few) == (1, (11, 7), "lamp", True)
     np.testing.assert_allclose(place.share, 9 / (9 + 0.0009), rtol=1e-12)
     np.testing.assert_allclose(place.relative_rmse_without, np.sqrt(0.0009 / 599), rtol=1e-12)
     assert "100 % of the squared error in 1 pixel (beside a light, in column 11, row 7)" in place.words
-    assert error_place(truth, truth, lamp) is None
-    assert not error_place(truth, 1.1 * truth, lamp).few
+    assert error_place(expected, expected, lamp) is None
+    assert not error_place(expected, 1.1 * expected, lamp).few
 
 
 @pytest.mark.claim("engine-verdict", tolerance="three standard deviations of the noise of a mean over 64 pixels")
 def test_noise_of_pixels_is_told_from_an_error_of_blocks():
-    truth = np.ones((160, 160, 3))
-    image = truth * (1 + 0.04 * np.random.default_rng(2).standard_normal(truth.shape))
-    verdict = judge(truth, image, find_hints(truth, image), ())
+    expected = np.ones((160, 160, 3))
+    image = expected * (1 + 0.04 * np.random.default_rng(2).standard_normal(expected.shape))
+    verdict = judge(expected, image, find_hints(expected, image), ())
     assert verdict.right
     np.testing.assert_allclose([verdict.block_error, verdict.block_noise], 0.04 / 8, rtol=0.05)
-    noisy = judge(truth, truth + 4 * (image - truth), find_hints(truth, image), ())
+    noisy = judge(expected, expected + 4 * (image - expected), find_hints(expected, image), ())
     assert "most of it noise: render more samples" in noisy.words
     image[40:80, 40:80] *= 0.9
-    verdict = judge(truth, image, find_hints(truth, image), ())
+    verdict = judge(expected, image, find_hints(expected, image), ())
     assert "means over 8 x 8 pixels are" in verdict.words
     assert "noise" not in verdict.words
-    assert not judge(truth, truth, find_hints(truth, truth), ("2 pixels are negative",)).right
+    assert not judge(expected, expected, find_hints(expected, expected), ("2 pixels are negative",)).right
     assert replace(verdict, reasons=()).right
-    dark = judge(0 * truth, 0 * truth, find_hints(truth, truth), ())
+    dark = judge(0 * expected, 0 * expected, find_hints(expected, expected), ())
     assert dark.words == "not right: nothing is lit in the pixels that are compared"
 
 
 @pytest.mark.claim("engine-verdict", tolerance="none: one of 75 lit values is wrong by a tenth, 1.2 % RMS")
 def test_one_wrong_block_of_few_is_not_forgiven():
     """A hundredth of the values may be wrong, which of 25 blocks is none; it used to be one at least."""
-    truth = np.zeros((160, 160, 3))
-    truth[:40, :40] = 1.0
-    image = truth.copy()
+    expected = np.zeros((160, 160, 3))
+    expected[:40, :40] = 1.0
+    image = expected.copy()
     image[8:16, 8:16, 1] *= 1.1
-    assert judge(truth, truth, find_hints(truth, truth), ()).right
-    assert not judge(truth, image, find_hints(truth, image), ()).right
+    assert judge(expected, expected, find_hints(expected, expected), ()).right
+    assert not judge(expected, image, find_hints(expected, image), ()).right
     # Of 400 lit blocks four may be as wrong as they like: that of a lamp, whose variance is infinite, among them.
-    lit = np.ones(truth.shape)
+    lit = np.ones(expected.shape)
     image = lit.copy()
     image[8:16, 8:16] *= 3
     assert judge(lit, image, find_hints(lit, image), ()).right

@@ -23,7 +23,7 @@ def scene(variant):
 
 
 def false_reference(monkeypatch, change):
-    """Let the comparison take a changed image for the truth."""
+    """Let the comparison take a changed image for the reference."""
     import validation.estimates.agreement
 
     true = validation.estimates.agreement.reference_image
@@ -33,14 +33,15 @@ def false_reference(monkeypatch, change):
 
 
 @pytest.mark.claim("volpath-agrees")
-def test_volpath_agrees_with_the_truth(scene):
+def test_volpath_agrees_with_the_reference(scene):
     verdicts = agreement(scene, **BUDGET)
     assert set(verdicts) == {"airlight", "surface"}
     for layer, verdict in verdicts.items():
         assert (verdict.layer, verdict.width, verdict.height, verdict.samples) == (layer, 24, 18, 64)
         assert 32 <= verdict.batches <= 40
         statistics = verdict.statistics
-        # The half width is 0.7 %: a right truth would be called wrong once in 10 000 seeds, and the seeds are fixed.
+        # The half width is 0.7 %: a right reference would be called wrong once in 10 000 seeds, and the seeds are
+        # fixed.
         assert statistics.equivalent is True, layer
         assert statistics.rejected == 0
         assert statistics.rejected_blocks == 0
@@ -53,7 +54,7 @@ def test_volpath_agrees_with_the_truth(scene):
 
 @pytest.mark.parametrize("layer", ["airlight", "surface"])
 @pytest.mark.parametrize("factor", [1.05, 0.95])
-def test_truth_that_is_five_per_cent_off_does_not_agree(scene, monkeypatch, layer, factor):
+def test_reference_that_is_five_per_cent_off_does_not_agree(scene, monkeypatch, layer, factor):
     """In one layer alone; the other one still agrees."""
     false_reference(monkeypatch, lambda image: replace(image, **{layer: factor * getattr(image, layer)}))
     verdicts = agreement(scene, **BUDGET)
@@ -63,7 +64,7 @@ def test_truth_that_is_five_per_cent_off_does_not_agree(scene, monkeypatch, laye
     assert verdicts[other].statistics.equivalent is True
 
 
-def test_truth_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatch):
+def test_reference_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatch):
     """A wrong shadow is no bias of the image; the tests of pixels and blocks must find it."""
 
     def corner(image):

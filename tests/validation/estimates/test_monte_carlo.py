@@ -45,7 +45,7 @@ def traced(monkeypatch, own_cache):
     """Put random numbers in the place of the tracer, and list the seeds that were asked for."""
     seeds = []
 
-    def trace(truth, seed, samples, *, max_depth=2, counts=None):
+    def trace(reference, seed, samples, *, max_depth=2, counts=None):
         seeds.append(seed)
         mean = np.random.default_rng([seed, samples, max_depth]).exponential(size=(2, 12, 3))
         return single_batch(seed, samples, mean)
@@ -291,15 +291,15 @@ def test_errors_by_hand():
 
 
 @pytest.mark.claim("pixels-beside-a-light")
-def test_pixels_beside_a_light_are_those_that_the_truth_names(variant):
+def test_pixels_beside_a_light_are_those_that_the_reference_names(variant):
     """The same pixels as from the quadrature's own angles; a light in view, one behind us, one in the sphere."""
     behind = {"type": "point", "position": [0.3, -6.0, 1.1]}
     hidden = {"type": "point", "position": [0.1, 0.3, 0.65]}
     scene = mi.load_dict(tiny_scene(size=(40, 30), behind=behind, hidden=hidden))
-    truth = read_reference(scene)
-    expected = reference_image(scene, checks=2).light_angle <= MASK_PIXELS * pixel_angle(truth)
+    reference = read_reference(scene)
+    expected = reference_image(scene, checks=2).light_angle <= MASK_PIXELS * pixel_angle(reference)
     assert 0 < expected.sum() < 40
-    np.testing.assert_array_equal(near_light(truth, surface_hits(truth).distance), expected.ravel())
+    np.testing.assert_array_equal(near_light(reference, surface_hits(reference).distance), expected.ravel())
 
 
 @pytest.mark.parametrize("odd", [np.nan, np.inf])
@@ -327,7 +327,7 @@ def loaded(variant, monkeypatch, own_cache, clock):
 
     import validation.estimates.monte_carlo
 
-    def trace(truth, seed, samples, **options):
+    def trace(reference, seed, samples, **options):
         clock.now += 1.0
         mean = np.random.default_rng(seed).normal(1.0, 0.4, (2, 12, 3))
         return single_batch(seed, samples, mean)

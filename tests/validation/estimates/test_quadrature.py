@@ -32,7 +32,7 @@ def scene(variant):
 
 @pytest.fixture
 def computed(monkeypatch):
-    """Count how often a truth image is computed."""
+    """Count how often a reference image is computed."""
     import validation.estimates.quadrature
 
     calls = []
@@ -60,8 +60,8 @@ def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
     assert np.isfinite(first.airlight).all()
 
 
-def test_other_phase_function_has_another_truth(scene, own_cache, computed):
-    """The phase function has no parameters that a key could see; an isotropic truth would pass for it."""
+def test_other_phase_function_has_another_reference(scene, own_cache, computed):
+    """The phase function has no parameters that a key could see; an isotropic reference would pass for it."""
     fog = tiny_scene()["fog"] | {"phase": {"type": "rayleigh"}}
     plain = reference_image(scene, checks=4)
     rayleigh = reference_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), checks=4)
@@ -69,7 +69,7 @@ def test_other_phase_function_has_another_truth(scene, own_cache, computed):
     assert np.abs(rayleigh.airlight / plain.airlight - 1).max() > 0.05
 
 
-def test_the_truth_of_some_pixels_is_that_of_the_image(scene, own_cache):
+def test_the_reference_of_some_pixels_is_that_of_the_image(scene, own_cache):
     pixels = np.array([3, 4, 40, 7])
     some, whole = reference_of_pixels(scene, pixels), reference_image(scene)
     for layer in ("airlight", "surface", "distance", "light_angle"):
@@ -83,7 +83,7 @@ def loaded(scene):
 
 
 @pytest.mark.claim("area-light-goes-on")
-def test_truth_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monkeypatch):
+def test_reference_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, monkeypatch):
     scene = lit_scene(size=(2, 2), lamp=lamp("sphere", center=[0.3, 0.2, 3.0], radius=0.4))
     done, compute = [], area_lights._scattered
 
@@ -132,7 +132,7 @@ def test_the_total_of_a_seen_light_is_what_mitsuba_shows(variant):
     place = mi.ScalarTransform4f().translate([0.0, 0.0, 2.5]).rotate([1, 0, 0], 180).scale([5.1, 4.7, 1.0])
     scene = lit_scene(size=(3, 2), medium=fog(0.21, 0.0), lamp=lamp(to_world=place, bsdf=NULL))
     seen = read_reference(scene)
-    truth = quadrature_image(seen, plan=PointPlan(error=0.0, first=2, most=2))
+    reference = quadrature_image(seen, plan=PointPlan(error=0.0, first=2, most=2))
     paths, shown = 1 << 14, {}
     ray = mi.RayDifferential3f(mi.Ray3f(mi.Point3f(0.0), mi.Vector3f(np.repeat(seen.direction, paths, axis=0).T)))
     for hidden in (False, True):
@@ -142,11 +142,11 @@ def test_the_total_of_a_seen_light_is_what_mitsuba_shows(variant):
         colour = integrator.sample(scene, sampler, ray, scene.sensors()[0].get_medium())[0]
         shown[hidden] = np.array(colour, dtype=np.float64).T.reshape(2, 3, paths, 3).mean(axis=2)
     # A path passes with probability p >= 0.43: four standard errors sqrt((1 - p)/(p paths)) of its mean are 3.6 %.
-    expected = reference_layer(truth, "total")
+    expected = reference_layer(reference, "total")
     assert expected.min() > 0.4
     assert shown[False] == pytest.approx(expected, rel=0.04)
     assert shown[True].max() == 0
-    assert reference_layer(truth, "total", emitted=False).max() == 0
+    assert reference_layer(reference, "total", emitted=False).max() == 0
 
 
 def test_variances_of_the_total_add_up():
@@ -181,9 +181,11 @@ def test_errors_of_points_that_all_pixels_share_add_up(common):
         values = 0.5 + replicates.mean(axis=-1)  # and 0.5 from a point light
         more = {"emitted": errors[0], "airlight_se": errors[0], "surface_se": errors[1]}
         means = replicates.mean(axis=(1, 2)).swapaxes(1, 2)
-        truth = ReferenceImage(values[0], 0 * values[0], values[1], none, none, 0, 0.0, **more, replicate_means=means)
+        reference = ReferenceImage(
+            values[0], 0 * values[0], values[1], none, none, 0, 0.0, **more, replicate_means=means
+        )
         sure = Estimate(np.ones((8, 12, 3)), np.full((8, 12, 3), 1e-9), 64)
-        statistics = compare_statistics(reference_estimate(truth, "airlight", sure, mask), sure, mask=mask)
+        statistics = compare_statistics(reference_estimate(reference, "airlight", sure, mask), sure, mask=mask)
         held += statistics.relative_bias_ci_batches[0] <= 0 <= statistics.relative_bias_ci_batches[1]
         apart += statistics.relative_bias_ci[0] <= 0 <= statistics.relative_bias_ci[1]
     assert held / 200 > 0.89
@@ -200,7 +202,7 @@ def scene_with(position, *, size=(9, 9), **changes):
 
 
 def references(scene):
-    """Return what gives the truth by each estimator."""
+    """Return what gives the reference by each estimator."""
 
     def sampled(estimator):
         return lambda: monte_carlo_batches(scene, estimator, batches=2, samples=1).batches.mean
@@ -211,9 +213,9 @@ def references(scene):
 @pytest.mark.claim("light-on-a-ray-refused")
 @pytest.mark.parametrize("position", [[0.0, -5.0, 1.0], [0.0, 0.0, 1.0], [1e-8, 0.0, 1.0]])
 def test_every_estimator_refuses_a_light_at_the_camera_or_on_a_ray(variant, position):
-    for truth in references(scene_with(position)):
+    for reference in references(scene_with(position)):
         with pytest.raises(InputError, match=r"light 1 at .* is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"):
-            truth()
+            reference()
 
 
 def test_a_spot_on_a_ray_is_refused_where_the_ray_is_in_its_cone(variant):
@@ -235,7 +237,7 @@ def test_the_mean_over_pixels_is_finite_where_a_centre_meets_a_light(variant):
         reference_image(scene_with([0.0, -5.0, 1.0], size=(3, 3)), pixel="area")
 
 
-def test_a_truth_that_is_not_finite_is_refused_and_not_kept(variant, own_cache, monkeypatch):
+def test_a_reference_that_is_not_finite_is_refused_and_not_kept(variant, own_cache, monkeypatch):
     scene = scene_with([1.0, 0.0, 1.0], size=(4, 3))
     whole = module.quadrature_image
 

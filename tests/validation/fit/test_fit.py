@@ -57,8 +57,10 @@ def scene_file(tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, po
 
 
 def image_of(path):
-    truth = reference_image(load_scene(path).scene)
-    return Image({"airlight": truth.airlight, "surface": truth.surface, "total": truth.airlight + truth.surface})
+    reference = reference_image(load_scene(path).scene)
+    return Image(
+        {"airlight": reference.airlight, "surface": reference.surface, "total": reference.airlight + reference.surface}
+    )
 
 
 def fitted(image, scene, names, **how):
@@ -107,9 +109,9 @@ def test_heights_of_a_layer_are_found_in_an_image_by_other_code(variant, tmp_pat
 @pytest.mark.slow
 def test_each_of_several_lights_has_a_factor(variant, tmp_path):
     scene = scene_file(tmp_path, lights=2)
-    truth = read_reference(load_scene(scene).scene)
+    reference = read_reference(load_scene(scene).scene)
     pixels = SIZE[0] * SIZE[1]
-    model = ImageModel.of(Seen(truth, np.ones((pixels, 3)), "airlight", np.ones(pixels, bool)))
+    model = ImageModel.of(Seen(reference, np.ones((pixels, 3)), "airlight", np.ones(pixels, bool)))
     bright = model.radiance(replace(model.fog, intensity=(1.4, 0.3)))
     image = Image({"airlight": bright.reshape(SIZE[1], SIZE[0], 3)})
     fit = fitted(image, scene, ["intensity", "sigma_t"])
@@ -170,11 +172,11 @@ def test_pixels_that_disagree_are_left_out(variant, tmp_path):
 @pytest.mark.statistical
 @pytest.mark.claim("fit-coverage")
 @pytest.mark.parametrize("noise", ["relative", "absolute", "skewed"])
-def test_intervals_cover_the_truth_as_often_as_they_say(variant, tmp_path, noise):
-    truth = read_reference(load_scene(scene_file(tmp_path), (32, 24)).scene)
-    fog, count, trials = scene_fog(truth), 32 * 24, 200
-    unknowns = read_unknowns(["sigma_t", "phase.g", "intensity"], truth, fog, {})
-    model = ImageModel.of(Seen(truth, np.zeros((count, 3)), "airlight", np.ones(count, bool)))
+def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, noise):
+    reference = read_reference(load_scene(scene_file(tmp_path), (32, 24)).scene)
+    fog, count, trials = scene_fog(reference), 32 * 24, 200
+    unknowns = read_unknowns(["sigma_t", "phase.g", "intensity"], reference, fog, {})
+    model = ImageModel.of(Seen(reference, np.zeros((count, 3)), "airlight", np.ones(count, bool)))
     clean = model.radiance(fog)
     generator = np.random.default_rng(5)
     wanted = np.array([unknown.scale.inward(unknown.scene) for unknown in unknowns])

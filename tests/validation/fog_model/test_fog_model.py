@@ -24,9 +24,9 @@ def relative(values, wanted):
 
 
 def model_and_image(name):
-    truth = read_reference(load_scene(name, SIZE).scene)
-    view = view_of(truth)
-    return truth, FogModel(view, scattering_paths(view)), quadrature_image(truth)
+    reference = read_reference(load_scene(name, SIZE).scene)
+    view = view_of(reference)
+    return reference, FogModel(view, scattering_paths(view)), quadrature_image(reference)
 
 
 @pytest.mark.claim("fit-model")
@@ -38,9 +38,9 @@ def model_and_image(name):
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("open-fog", "omni-box", "windows", "clutter")),
     ],
 )
-def test_radiance_is_that_of_the_truth(variant, name):
-    truth, model, image = model_and_image(name)
-    airlight, surface = model.layers(scene_fog(truth))
+def test_radiance_is_that_of_the_reference(variant, name):
+    reference, model, image = model_and_image(name)
+    airlight, surface = model.layers(scene_fog(reference))
     # Nodes err by 3e-8 a panel where the integrand is smooth, by 2e-5 where a leg grazes a sphere of medium.
     error = relative(airlight, image.airlight.reshape(-1, 3))
     assert np.quantile(error, 0.99) < 1e-6
@@ -55,21 +55,21 @@ def test_radiance_is_that_of_the_truth(variant, name):
 def test_radiance_in_height_fog_is_that_of_the_reference(variant, tmp_path):
     path = tmp_path / "fog.xml"
     path.write_text(fog_xml(LAMP, SPOT, SUN, size=SIZE))
-    truth, model, image = model_and_image(str(path))
-    airlight, surface = model.layers(scene_fog(truth))
+    reference, model, image = model_and_image(str(path))
+    airlight, surface = model.layers(scene_fog(reference))
     assert np.quantile(relative(airlight, image.airlight.reshape(-1, 3)), 0.99) < 1e-6
     assert np.quantile(relative(surface, image.surface.reshape(-1, 3)), 0.99) < 1e-5
 
 
 def test_laws_can_be_changed_one_by_one(variant):
-    truth = read_reference(load_scene("open-fog", SIZE).scene)
-    view = view_of(truth)
-    model, fog = FogModel(view, scattering_paths(view)), scene_fog(truth)
+    reference = read_reference(load_scene("open-fog", SIZE).scene)
+    view = view_of(reference)
+    model, fog = FogModel(view, scattering_paths(view)), scene_fog(reference)
     nodes = model.lights[0].nodes
     right = model.layers(fog)[0]
     sigma_t = fog.sigma_t[0][0]
-    strength = truth.medium.albedo[0] * sigma_t * model.lights[0].intensity[0] / (4 * np.pi)
-    direction = truth.direction[nodes.ray]
+    strength = reference.medium.albedo[0] * sigma_t * model.lights[0].intensity[0] / (4 * np.pi)
+    direction = reference.direction[nodes.ray]
     axis = model.view.axis
 
     def summed(depth, power=2.0, factor=1.0):

@@ -250,8 +250,8 @@ def test_values_that_are_not_finite_reach_no_level():
 
 
 def test_measured_errors_and_times_are_those_of_the_kernel(variant):
-    truth, timed = wide_rays(512), wide_rays(4096, truth=False)
-    coarse, fine = (measure("quadrature", n, truth=truth, timed=timed, seconds=0.05) for n in (4, 16))
+    reference, timed = wide_rays(512), wide_rays(4096, reference=False)
+    coarse, fine = (measure("quadrature", n, reference=reference, timed=timed, seconds=0.05) for n in (4, 16))
     names = ("kernel", "family", "size", "rays")
     assert [fine[name] for name in names] == ["quadrature-16", "quadrature", 16, 4096]
     # The certified bound of 16 nodes is 4e-6; float32 rounds exponents of up to 60.
@@ -267,7 +267,7 @@ COLUMNS = ("g", "foot", "height", "x0", "x1", "sigma_t")
 
 
 @pytest.fixture
-def rays():  # of one test, so that the truth is kept in the tests' own cache
+def rays():  # of one test, so that the reference is kept in the tests' own cache
     return hard_rays(2048)
 
 
@@ -299,7 +299,7 @@ def test_inputs_are_exact_float32_and_values_fit_float32(draw):
     assert cases.value.max() < 3e38
 
 
-def test_truth_is_certified(rays):
+def test_reference_is_certified(rays):
     """A few of each tag by mpmath."""
     for tag in set(rays.tag):
         k = rays.tag.index(tag)

@@ -201,7 +201,7 @@ def test_values_that_are_not_finite_are_counted_and_left_out():
 
 @pytest.mark.slow
 @pytest.mark.claim("sequence-intervals")
-def test_intervals_hold_the_truth():
+def test_intervals_hold_the_reference():
     """Of 100 repeats 95 % intervals hold it in 90 to 99, and numbers scatter as their errors say."""
     frames, held = ghosted(0.0, 6), np.zeros(4)
     scores = []

@@ -33,8 +33,8 @@ def test_order_one_is_that_of_light_paths():
     ).image
     method = METHODS["cloud-octaves"]
     frame = render_frame(frame_renderer(read_scene(scene), method, octaves=1, steps=128, extra_layers=True))
-    truth, error = (sampled.layers[name].astype(np.float64) for name in ("airlight_1", "airlight_1_se"))
-    difference = frame.airlight - truth
+    reference, error = (sampled.layers[name].astype(np.float64) for name in ("airlight_1", "airlight_1_se"))
+    difference = frame.airlight - reference
     assert np.count_nonzero(error) > 150
     # Four batches: the error of a pixel is known to 40 %, that of all pixels together well.
     assert 0.5 < np.sum(difference**2) / np.sum(error**2) < 1.6

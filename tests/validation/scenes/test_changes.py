@@ -70,19 +70,19 @@ def test_a_scene_that_is_read_again_is_the_scene_read_anew(name):
     assert again.geometry is before.geometry
 
 
-def test_methods_and_truth_see_the_same_camera_light_and_medium():
+def test_methods_and_reference_see_the_same_camera_light_and_medium():
     loaded = load_scene("colonnade", (16, 12), CHANGES["colonnade"])
-    scene, truth = read_scene(loaded.scene), read_reference(loaded.scene)
-    np.testing.assert_allclose(np.array(scene.camera.origin).ravel(), truth.origin, rtol=1e-6)
-    middle = truth.direction.reshape(12, 16, 3)[5:7, 7:9].mean(axis=(0, 1))
+    scene, reference = read_scene(loaded.scene), read_reference(loaded.scene)
+    np.testing.assert_allclose(np.array(scene.camera.origin).ravel(), reference.origin, rtol=1e-6)
+    middle = reference.direction.reshape(12, 16, 3)[5:7, 7:9].mean(axis=(0, 1))
     aim = np.subtract((4.7, 1.5, 4.3), (1.3, 1.9, 4.1))
     np.testing.assert_allclose(middle / np.linalg.norm(middle), aim / np.linalg.norm(aim), atol=1e-5)
-    np.testing.assert_allclose(truth.lights[0].position, (5.3, 1.7, 3.9), rtol=1e-6)
-    np.testing.assert_allclose(truth.lights[0].intensity, (111.0, 97.0, 53.0), rtol=1e-6)
+    np.testing.assert_allclose(reference.lights[0].position, (5.3, 1.7, 3.9), rtol=1e-6)
+    np.testing.assert_allclose(reference.lights[0].intensity, (111.0, 97.0, 53.0), rtol=1e-6)
     np.testing.assert_allclose(np.array(scene.lights[0].position).ravel(), (5.3, 1.7, 3.9), rtol=1e-6)
-    np.testing.assert_allclose(truth.medium.sigma_t, 0.13, rtol=1e-6)
+    np.testing.assert_allclose(reference.medium.sigma_t, 0.13, rtol=1e-6)
     np.testing.assert_allclose(float(scene.medium.sigma_t[0][0]), 0.13, rtol=1e-6)
-    assert truth.medium.phase.g == pytest.approx(-0.41, rel=1e-6)
+    assert reference.medium.phase.g == pytest.approx(-0.41, rel=1e-6)
     assert float(scene.medium.phase.g[0]) == pytest.approx(-0.41, rel=1e-6)
     assert mi.traverse(loaded.scene.sensors()[0])["x_fov"][0] == pytest.approx(61.7)
 
@@ -119,7 +119,7 @@ def test_a_change_that_cannot_be_is_one_line(change, message):
 
 
 @pytest.mark.parametrize("as_file", [False, True])
-def test_an_isotropic_medium_gets_a_lobe_for_methods_and_truth(tmp_path, as_file):
+def test_an_isotropic_medium_gets_a_lobe_for_methods_and_reference(tmp_path, as_file):
     name = "open-fog"
     if as_file:
         name = str(tmp_path / "fog.xml")
@@ -127,9 +127,9 @@ def test_an_isotropic_medium_gets_a_lobe_for_methods_and_truth(tmp_path, as_file
         mi.parser.write_file(parsed, name)
     scene = load_scene(name, (16, 12), {"medium.g": (0.31,), "medium.sigma_t": (0.2,)}).scene
     assert float(read_scene(scene).medium.phase.g[0]) == pytest.approx(0.31)
-    truth = read_reference(scene)
-    assert (truth.medium.phase.name, truth.medium.phase.g) == ("hg", pytest.approx(0.31))
-    np.testing.assert_allclose(truth.medium.sigma_t, 0.2, rtol=1e-6)
+    reference = read_reference(scene)
+    assert (reference.medium.phase.name, reference.medium.phase.g) == ("hg", pytest.approx(0.31))
+    np.testing.assert_allclose(reference.medium.sigma_t, 0.2, rtol=1e-6)
     same = load_scene(name, (16, 12), {"medium.g": (0.0,)}).scene
     assert read_reference(same).medium.phase.name == "isotropic"
     assert changeable(same)["medium.g"].value == (0.0,)

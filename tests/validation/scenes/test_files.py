@@ -51,8 +51,8 @@ def load(variant, tmp_path):
 
 
 def image(scene):
-    truth = quadrature_image(read_reference(scene))
-    return np.stack([truth.airlight, truth.surface])
+    reference = quadrature_image(read_reference(scene))
+    return np.stack([reference.airlight, reference.surface])
 
 
 def test_a_cylinder_is_one_mesh_for_all(load):
@@ -367,12 +367,12 @@ def fog_of(phase, size=(8, 6)):
 
 
 @pytest.mark.claim("droplets-in-scenes", tolerance="2e-3 relative: kernels integrate across the kinks of the table")
-def test_methods_and_truth_see_the_same_fog_of_droplets(variant):
+def test_methods_and_reference_see_the_same_fog_of_droplets(variant):
     scene = fog_of(tabulated_phase("mie", 2001))
     assert read_scene(scene).medium.phase.lobe < 0.1
-    truth = quadrature_image(read_reference(scene), checks=2).airlight.reshape(-1)
+    reference = quadrature_image(read_reference(scene), checks=2).airlight.reshape(-1)
     frame = np.array(render(scene, "unshadowed").airlight, dtype=np.float64).T.reshape(-1)
-    assert np.sort(frame) == pytest.approx(np.sort(truth), rel=2e-3)
+    assert np.sort(frame) == pytest.approx(np.sort(reference), rel=2e-3)
 
 
 @pytest.mark.claim("droplets-in-scenes", tolerance="1 % bias of Mitsuba's sampling, by its own interval")

@@ -92,9 +92,9 @@ def test_refusals_of_the_scene(loaded):
         <medium type="homogeneous" name="interior"/></shape>"""
     with pytest.raises(InputError, match="shape 'drop' bounds a medium in height fog"):
         read_reference(loaded(fog_xml(LAMP, ball)))
-    truth = read_reference(loaded(fog_xml(SPOT)))
+    reference = read_reference(loaded(fog_xml(SPOT)))
     with pytest.raises(InputError, match="an extinction that differs from place to place"):
-        _ = truth.medium.sigma_t
+        _ = reference.medium.sigma_t
 
 
 def _fog(engine, **given):

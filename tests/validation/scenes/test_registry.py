@@ -29,24 +29,24 @@ def loaded(name):
 
 
 @pytest.mark.parametrize("name", FOG_SCENES)
-def test_methods_and_truth_can_read_every_scene_alike(variant, name):
+def test_methods_and_reference_can_read_every_scene_alike(variant, name):
     """The two readers share no code: that they agree says that both are right."""
     built = loaded(name)
-    scene, truth = read_scene(built.scene), read_reference(built.scene)
+    scene, reference = read_scene(built.scene), read_reference(built.scene)
     assert built.name == name
     assert built.purpose.endswith(".")
-    assert (scene.camera.width, scene.camera.height) == (truth.width, truth.height) == (8, 6)
+    assert (scene.camera.width, scene.camera.height) == (reference.width, reference.height) == (8, 6)
     sigma_t = np.array([np.array(value)[0] for value in scene.medium.sigma_t])
     # Mitsuba holds both in float32: 6e-8.
-    np.testing.assert_allclose(np.broadcast_to(sigma_t, 3), truth.medium.sigma_t, rtol=3e-7)
-    np.testing.assert_allclose(np.array(scene.medium.albedo).reshape(-1), truth.medium.albedo, rtol=3e-7)
-    _check_lights(scene, truth)
+    np.testing.assert_allclose(np.broadcast_to(sigma_t, 3), reference.medium.sigma_t, rtol=3e-7)
+    np.testing.assert_allclose(np.array(scene.medium.albedo).reshape(-1), reference.medium.albedo, rtol=3e-7)
+    _check_lights(scene, reference)
 
 
-def _check_lights(scene, truth):
-    if truth.area:
-        assert scene.lights == truth.lights == truth.directional == ()
-        (wide,), (counterpart,) = scene.area_lights, truth.area
+def _check_lights(scene, reference):
+    if reference.area:
+        assert scene.lights == reference.lights == reference.directional == ()
+        (wide,), (counterpart,) = scene.area_lights, reference.area
         assert (wide.name, wide.kind, wide.opaque) == (counterpart.name, counterpart.kind, counterpart.opaque)
         np.testing.assert_allclose(wide.middle, counterpart.centre, rtol=3e-7)
         np.testing.assert_allclose(wide.radiance, counterpart.radiance, rtol=3e-7)
@@ -55,7 +55,7 @@ def _check_lights(scene, truth):
             np.testing.assert_allclose(wide.normal, counterpart.normal, atol=1e-6)
         return
     (light,) = scene.lights
-    (other,) = truth.lights + truth.directional
+    (other,) = reference.lights + reference.directional
     if light.kind == "directional":
         of_methods, of_reference = light.axis, other.direction
         np.testing.assert_allclose(np.array(light.intensity).reshape(-1), other.irradiance, rtol=3e-7)
@@ -100,19 +100,19 @@ def test_scenes_have_as_many_triangles_as_their_records_say(variant, name):
 
 def test_sun_comes_in_by_the_windows_alone(variant):
     """Lit parts of rays lead back to a pane: what the wall's openings let through, in coordinates of the wall."""
-    truth = read_reference(load_scene("windows", (40, 30)).scene)
+    reference = read_reference(load_scene("windows", (40, 30)).scene)
     wall = tomllib.loads(FILES[0].read_text())["windows"]["shapes"][1]
     left, front = wall["corner"][:2]
-    intervals = lit_parallel_rays(truth, truth.directional[0], surface_hits(truth).distance).lit
+    intervals = lit_parallel_rays(reference, reference.directional[0], surface_hits(reference).distance).lit
     assert intervals.transitions > 500
     assert intervals.random_checks.left == 0
     x, width = 0.5 * (intervals.low + intervals.high), intervals.high - intervals.low
-    point = truth.origin + x[:, None] * truth.direction[intervals.ray]
+    point = reference.origin + x[:, None] * reference.direction[intervals.ray]
     # The room alone, and no seams: vertices are float32, so shapes that touch are a micrometre apart.
     behind, beside = point[:, 0] > left, np.abs(point[:, 1] - front - wall["along"][-1] / 2) < wall["along"][-1] / 2
     point = point[behind & beside & (point[:, 2] < wall["up"][-1]) & (width > 1e-5)]
     assert len(point) > 500
-    towards = -truth.directional[0].direction
+    towards = -reference.directional[0].direction
     at_wall = point + ((left - point[:, 0]) / towards[0])[:, None] * towards
     along, up = np.searchsorted(wall["along"], at_wall[:, 1] - front), np.searchsorted(wall["up"], at_wall[:, 2])
     assert np.all((along % 2 == 0) & (up % 2 == 0))

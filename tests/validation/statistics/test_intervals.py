@@ -93,11 +93,11 @@ def test_rank_correlation_holds_the_true_one_about_as_often_as_it_says():
     """Of two normal variables with the correlation c the true one is (6/pi) asin(c/2)."""
     rng = np.random.default_rng(5)
     for c in (0.0, 0.5, 0.8):
-        truth, held = 6 / np.pi * np.arcsin(c / 2), 0
+        reference, held = 6 / np.pi * np.arcsin(c / 2), 0
         for _ in range(2000):
             x = rng.normal(size=80)
             _, low, high = rank_correlation(x, c * x + np.sqrt(1 - c * c) * rng.normal(size=80))
-            held += low <= truth <= high
+            held += low <= reference <= high
         # An approximation: within 0.015 of the level, and four standard errors of a share of 2000, 0.0195.
         assert held / 2000 == pytest.approx(0.95, abs=0.035)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rates of the statistical tests, by images with a known truth; see `tests.helpers.calibration` for what they are.
+"""Rates of the statistical tests, by images with a known reference; see `tests.helpers.calibration` for what they are.
 
 A rate may leave the interval that holds it with probability 1 - 1e-4 by the binomial law; seeds are fixed, so each test
 fails only if the routine changes.

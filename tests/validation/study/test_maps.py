@@ -42,8 +42,8 @@ def test_errors_of_a_map_are_of_first_order(variant, lamp):
     """The scatter of an order fitted to these 768 pixels is 0.04; grazing rays take up to 0.1 from 1."""
     scene = small_scene(**({"lamp": spot()} if lamp == "spot" else {}))
     sizes = (16, 32, 64, 128, 256)
-    read, truth = read_scene(scene), reference_image(scene).airlight
-    metrics = [error_metrics(truth, render_frame(prepared(read, chosen)).airlight) for chosen in marches(*sizes)]
+    read, reference = read_scene(scene), reference_image(scene).airlight
+    metrics = [error_metrics(reference, render_frame(prepared(read, chosen)).airlight) for chosen in marches(*sizes)]
     exponent, standard_error = fitted_exponent(sizes, [each.relative_rmse for each in metrics])
     assert exponent == pytest.approx(-1, abs=0.2)
     assert 0 < standard_error < 0.1
@@ -77,7 +77,7 @@ def causes(parts):
     return [(part["cause"], part["without"]) for part, _ in parts[1:]]
 
 
-@pytest.mark.claim("error-by-cause", tolerance="1e-6 of the mean of the truth, pixel by pixel")
+@pytest.mark.claim("error-by-cause", tolerance="1e-6 of the mean of the reference, pixel by pixel")
 @pytest.mark.parametrize(
     ("method", "kernel", "parameters"),
     [
@@ -96,7 +96,7 @@ def causes(parts):
 )
 def test_the_parts_add_up_to_the_whole(variant, method, kernel, parameters):
     (whole, error), *parts = split(method, kernel, **parameters)
-    mean = error.mean() / whole["relative_bias"]  # of the truth
+    mean = error.mean() / whole["relative_bias"]  # of the reference
     np.testing.assert_allclose(np.sum([image for _, image in parts], axis=0), error, atol=1e-6 * mean)
     assert sum(part["share"] for part, _ in parts) == pytest.approx(1, abs=1e-9)
     assert whole["relative_rmse"] > 1e-4

@@ -172,21 +172,21 @@ class Clock:
 @pytest.mark.usefixtures("variant")
 def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache, monkeypatch):
     loaded = load_cell(Cell("penumbra-plane", (40, 32), (), configuration("unshadowed")))
-    truth = cell_reference(loaded)
-    assert truth.mask is not None
-    assert int(truth.mask.sum()) == 40 * 32 // 16
-    assert truth.surface is None
+    reference = cell_reference(loaded)
+    assert reference.mask is not None
+    assert int(reference.mask.sum()) == 40 * 32 // 16
+    assert reference.surface is None
     again = cell_reference(loaded)
-    assert (again.airlight == truth.airlight).all()
-    assert again.spent == truth.spent
-    finer = reference_of_pixels(loaded.scene, np.flatnonzero(truth.mask))
+    assert (again.airlight == reference.airlight).all()
+    assert again.spent == reference.spent
+    finer = reference_of_pixels(loaded.scene, np.flatnonzero(reference.mask))
     assert finer.airlight_se is not None
     beyond = []
     for seed in range(16):
         monkeypatch.setattr(sampled, "_PLAN", replace(sampled._PLAN, seed=seed))
         some = sampled.sampled_reference(loaded.scene)
-        difference = np.abs(some["airlight"][truth.mask] - finer.airlight[0])
-        beyond.append((difference > some["bound"][truth.mask] + 3 * finer.airlight_se[0]).mean())
+        difference = np.abs(some["airlight"][reference.mask] - finer.airlight[0])
+        beyond.append((difference > some["bound"][reference.mask] + 3 * finer.airlight_se[0]).mean())
     # The bound is three standard errors of eight replicates, beyond which 2.0 % of Student's law lie. The pixels of a
     # run share their points, the runs do not: four standard errors of the mean over runs.
     assert np.mean(beyond) <= 2 * stats.t.sf(3, 7) + 4 * np.std(beyond, ddof=1) / np.sqrt(len(beyond))

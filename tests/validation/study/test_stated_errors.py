@@ -50,16 +50,16 @@ def clipped_edge(along=ACROSS, fov=0.012):
 
 def chords(scene):
     """Return what of each ray lies in the box, by crossings with the triangles of it, in float64 [m]."""
-    truth = read_reference(scene)
+    reference = read_reference(scene)
     parameters = mi.traverse(scene.shapes()[0])
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
     a, b, c = np.moveaxis(vertices[np.array(parameters["faces"]).reshape(-1, 3)], 1, 0)
     ends = []
-    for direction in truth.direction:
+    for direction in reference.direction:
         # Moeller and Trumbore 1997.
-        p, q = np.cross(direction, c - a), np.cross(truth.origin - a, b - a)
+        p, q = np.cross(direction, c - a), np.cross(reference.origin - a, b - a)
         scale = 1 / np.sum((b - a) * p, axis=1)
-        u, v = np.sum((truth.origin - a) * p, axis=1) * scale, (q @ direction) * scale
+        u, v = np.sum((reference.origin - a) * p, axis=1) * scale, (q @ direction) * scale
         t = np.sum((c - a) * q, axis=1) * scale
         hit = t[(u >= 0) & (v >= 0) & (u + v <= 1)]
         ends.append(np.ptp(hit) if len(hit) else 0.0)
@@ -67,25 +67,25 @@ def chords(scene):
 
 
 def errors(scene, method, **parameters):
-    """Return truth and the error of an image, (pixels, 3) each [W/(m^2 sr)]."""
+    """Return reference and the error of an image, (pixels, 3) each [W/(m^2 sr)]."""
     frame = np.asarray(render(scene, method, **parameters).airlight, dtype=np.float64).reshape(-1, 3)
-    truth = reference_image(scene).airlight.reshape(-1, 3)
-    return truth, np.abs(frame - truth)
+    reference = reference_image(scene).airlight.reshape(-1, 3)
+    return reference, np.abs(frame - reference)
 
 
 @pytest.mark.claim("sweep-bounds", tolerance="8 units of float32 of each end; a quarter of the bends of a table")
 def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth():
     # random:3 has such pixels: a ray clips the edge of a medium, or a surface stands just behind its bound.
     scene = clipped_edge()
-    truth, error = errors(scene, "shadow-planes")
-    lit = np.flatnonzero(truth[:, 0] > 0)
+    reference, error = errors(scene, "shadow-planes")
+    lit = np.flatnonzero(reference[:, 0] > 0)
     assert len(lit) > 50
-    # A third route says that the truth is right: over so short a chord all is constant.
+    # A third route says that the reference is right: over so short a chord all is constant.
     distance = np.linalg.norm(LAMP - HALF * (1, 1, 0))
     scattered = ALBEDO * SIGMA_T * INTENSITY / (4 * np.pi * distance**2)
-    assert truth[lit, 0] == pytest.approx(chords(scene)[lit] * scattered, rel=2e-3)
+    assert reference[lit, 0] == pytest.approx(chords(scene)[lit] * scattered, rel=2e-3)
     worth = bounds.worth_of_ends(scene, lit)
-    assert (error[lit] > bounds.ROUNDING * truth[lit]).any()  # so rounding of the pixel alone is no bound
+    assert (error[lit] > bounds.ROUNDING * reference[lit]).any()  # so rounding of the pixel alone is no bound
     assert (error[lit] <= worth).all()
     assert error[lit].max() > 0.05 * worth.max()
     # The most where rays leave, by the face that they meet at the smaller angle, behind the whole chord.
@@ -113,11 +113,11 @@ def test_the_kinks_of_a_table_are_worth_a_quarter_of_its_bends(words, values):
             "camera": camera((0.1, -2.3, 0.2), (0.6, 1.9, 0.3), fov=77.0, size=(24, 18)),
         }
     )
-    truth, error = errors(scene, "unshadowed")
+    reference, error = errors(scene, "unshadowed")
     stated = bounds.stated_bound(configuration("unshadowed"), read_scene(scene))
     assert stated is not None
     kinks = stated - bounds.ROUNDING
-    relative = (error / truth).max()
+    relative = (error / reference).max()
     assert relative < 3e-6 + kinks
     if words == "murky":
         assert relative > 0.03 * kinks > 1e-5

@@ -16,16 +16,16 @@ FINE = {"sampling": "pixels", "slices": 6000}
 
 
 @pytest.mark.parametrize("name", ["aslant", "along the view"])
-def test_against_the_truth(variant, name):
+def test_against_the_reference(variant, name):
     scene = shaded(solid=solid((0.5, 0.4, 0.3), (0.33, 0.27, 1.75)))
     if name == "along the view":
         # The image of the light is the middle of the image: rays beside it lie along the slices.
         scene = shaded(solid=solid((0.4, 0.3, 0.3), (0.753, -1.67, 1.17)), lamp=sun((-0.1, 4.1, -0.7)))
-    truth = reference_image(mi.load_dict(scene)).airlight
+    reference = reference_image(mi.load_dict(scene)).airlight
     loaded = read(scene)
-    errors = [relative_rmse(render(loaded, "min-max", map=size, **FINE).airlight, truth) for size in (64, 1024)]
+    errors = [relative_rmse(render(loaded, "min-max", map=size, **FINE).airlight, reference) for size in (64, 1024)]
     # A texel of the slanted walls at every jump, in a shadow that takes a fair part of the light.
     assert errors[1] < min(0.05, 0.4 * errors[0])
-    # The height field of the map itself, with slanted walls, is about as far from the truth.
-    walked = relative_rmse(render(loaded, "light-volumes", map=1024, walls="slanted").airlight, truth)
+    # The height field of the map itself, with slanted walls, is about as far from the reference.
+    walked = relative_rmse(render(loaded, "light-volumes", map=1024, walls="slanted").airlight, reference)
     assert errors[1] < 3 * walked + 2e-3

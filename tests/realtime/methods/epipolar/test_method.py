@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of one-dimensional min/max mipmaps against the truth, and against light volumes of the same map."""
+"""Frames of one-dimensional min/max mipmaps against the reference, and against light volumes of the same map."""
 
 import numpy as np
 import pytest
 
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
-from tests.helpers.frames import frame, relative_rmse, truth
+from tests.helpers.frames import frame, reference_of, relative_rmse
 from tests.helpers.light_frames import SIZE, camera, coloured_fog, lamp
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.loading import load_scene
@@ -32,10 +32,10 @@ def render(scene, method, **parameters):
 
 @pytest.mark.claim("tree-of-bounds", tolerance="a fifth of the shadows; 0.4 of the error with an eighth of the texel")
 @pytest.mark.parametrize("change", ALL)
-def test_every_pixel_comes_to_the_truth_as_the_map_grows(variant, change):
+def test_every_pixel_comes_to_the_reference_as_the_map_grows(variant, change):
     """Where the map jumps a wall leans over one texel: the error falls as its size, as its root at grazing rays."""
     scene = scene_with(change)
-    expected = truth(scene).airlight
+    expected = reference_of(scene).airlight
     errors = [
         relative_rmse(render(scene, "min-max", map=size, sampling="pixels", slices=1600), expected)
         for size in (64, 512)

@@ -17,7 +17,7 @@ from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Isotropic
 from reference.scene.read import read_reference
 from tests.helpers import probes
-from tests.helpers.frames import frame, read, relative_rmse, truth
+from tests.helpers.frames import frame, read, reference_of, relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.suns import brick, pearl, sunny
 
@@ -51,16 +51,16 @@ def hazy(sigma_t=(0.11, 0.37, 0.93)):
 
 def by_hand(scene, *, width, height, slices, near, far):
     """Do what the method does in NumPy, from the formulas of its documentation; no shadows, no bounds."""
-    truth = read_reference(mi.load_dict(scene))
+    reference = read_reference(mi.load_dict(scene))
     matrix = np.array(mi.load_dict(scene).sensors()[0].world_transform().matrix, dtype=float).reshape(4, 4)
     origin, forward = matrix[:3, 3], matrix[:3, 2]
     half = np.tan(np.radians(0.5 * scene["sensor"]["fov"]))
-    left, up = matrix[:3, 0] * half, matrix[:3, 1] * half * truth.height / truth.width
+    left, up = matrix[:3, 0] * half, matrix[:3, 1] * half * reference.height / reference.width
 
     def depth(s):
         return near * ((1 + far / near) ** s - 1)
 
-    sigma, albedo, g = truth.medium.sigma_t, truth.medium.albedo, 0.43
+    sigma, albedo, g = reference.medium.sigma_t, reference.medium.albedo, 0.43
     sums = np.zeros((slices + 1, height, width, 3))
     for j in range(height):
         for i in range(width):
@@ -70,7 +70,7 @@ def by_hand(scene, *, width, height, slices, near, far):
                 begin, end = depth(k / slices), depth((k + 1) / slices)
                 point = origin + 0.5 * (begin + end) * ray
                 source = np.zeros(3)
-                for light in truth.lights:
+                for light in reference.lights:
                     toward = light.position - point
                     r = np.linalg.norm(toward)
                     cosine = toward @ ray / (r * stretch)
@@ -86,11 +86,11 @@ def by_hand(scene, *, width, height, slices, near, far):
                 sums[k + 1, j, i] = sums[k, j, i] + kept * source * (1 - np.exp(-sigma * length)) / sigma
                 kept *= np.exp(-sigma * length)
     # Between the middles of columns and the ends of slices: rays that meet no surface end at the last slice.
-    image = np.zeros((truth.height, truth.width, 3))
-    for row in range(truth.height):
-        for column in range(truth.width):
-            x = np.clip((column + 0.5) / truth.width * width - 0.5, 0, width - 1)
-            y = np.clip((row + 0.5) / truth.height * height - 0.5, 0, height - 1)
+    image = np.zeros((reference.height, reference.width, 3))
+    for row in range(reference.height):
+        for column in range(reference.width):
+            x = np.clip((column + 0.5) / reference.width * width - 0.5, 0, width - 1)
+            y = np.clip((row + 0.5) / reference.height * height - 0.5, 0, height - 1)
             for i in range(width):
                 for j in range(height):
                     share = max(0, 1 - abs(x - i)) * max(0, 1 - abs(y - j))
@@ -167,7 +167,7 @@ def test_the_error_falls_with_the_grid_in_order(variant):
     errors = [
         relative_rmse(
             frame(scene, "froxel-fog", width=2 * n, height=n, slices=n, shadow="ray").airlight,
-            truth(scene).airlight,
+            reference_of(scene).airlight,
         )
         for n in sizes.tolist()
     ]
@@ -176,7 +176,7 @@ def test_the_error_falls_with_the_grid_in_order(variant):
 
 def test_shadows_of_the_sun_are_there(variant):
     scene = probes.sun()
-    exact = truth(scene).airlight
+    exact = reference_of(scene).airlight
     without = frame(scene, "unshadowed").airlight
     froxels = frame(scene, "froxel-fog", shadow="ray").airlight
     assert relative_rmse(froxels, exact) < 0.25 * relative_rmse(without, exact)

@@ -72,13 +72,13 @@ def test_slopes_are_no_walls(variant):
 
 @pytest.mark.claim("upright-walls")
 def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
-    """The frame against the truth: what is left are the corners, and a 64th of a texel."""
+    """The frame against the reference: what is left are the corners, and a 64th of a texel."""
     description = tiny_scene(size=(40, 30), **FLAT, plate=plate(-0.31, -0.47))
-    truth = reference_image(mi.load_dict(description)).airlight
+    reference = reference_image(mi.load_dict(description)).airlight
     loaded = mi.load_dict(description)
 
     def error(walls):
         airlight = render(loaded, "light-volumes", map=16, walls=walls).airlight
-        return np.sqrt(np.mean((airlight - truth) ** 2)) / np.mean(truth)
+        return np.sqrt(np.mean((airlight - reference) ** 2)) / np.mean(reference)
 
     assert error("upright") < 0.15 * error("slanted")

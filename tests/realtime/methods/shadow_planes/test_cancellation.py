@@ -55,14 +55,14 @@ def airlight(scene, precision, **parameters):
 )
 def test_the_default_keeps_the_digits_that_gamma_loses(variant):
     built = slats()
-    truth = quadrature_image(read_reference(built)).airlight
+    reference = quadrature_image(read_reference(built)).airlight
 
-    def errors(image, expected=truth):
-        return np.abs(image - expected) / np.maximum(truth, FLOOR * truth.mean())
+    def errors(image, expected=reference):
+        return np.abs(image - expected) / np.maximum(reference, FLOOR * reference.mean())
 
     segments = airlight(built, "single", sum="segments")
     assert errors(segments).max() < 1e-4
-    assert segments.min() >= -1e-5 * truth.mean()
+    assert segments.min() >= -1e-5 * reference.mean()
     double = airlight(built, "double", sum="segments")
     assert np.quantile(errors(double), 0.99) < 1e-6
     gamma = np.quantile(errors(airlight(built, "single", sum="gamma")), 0.99)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shadow planes of a light at infinity, in bounded media.
 
-Claim: they are as exact as those of a light with a place, whatever lies along the light. The truth casts its own rays,
-bisects its lit intervals and shares nothing with this side.
+Claim: they are as exact as those of a light with a place, whatever lies along the light. The reference casts its own
+rays, bisects its lit intervals and shares nothing with this side.
 """
 
 from typing import Any
@@ -33,13 +33,13 @@ def scenes() -> dict[str, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("name", ["two media", "parallel to edges"])
-def test_against_the_truth(variant, name):
+def test_against_the_reference(variant, name):
     scene = scenes()[name]
-    truth = reference_image(mi.load_dict(scene)).airlight
+    reference = reference_image(mi.load_dict(scene)).airlight
     loaded = read(scene, "double")
     unshadowed = render(loaded).airlight
-    assert relative_rmse(unshadowed, truth) > 0.02  # there is a shadow
-    # The panels of two media leave 3e-6 without any shadow; the rest is the truth's rays, cast in float32.
+    assert relative_rmse(unshadowed, reference) > 0.02  # there is a shadow
+    # The panels of two media leave 3e-6 without any shadow; the rest is the reference's rays, cast in float32.
     allowed = 1e-5 if name == "two media" else 2e-6
-    assert relative_rmse(render(loaded, "shadow-planes").airlight, truth) < allowed
-    assert relative_rmse(render(scene, "shadow-planes").airlight, truth) < 5e-5
+    assert relative_rmse(render(loaded, "shadow-planes").airlight, reference) < allowed
+    assert relative_rmse(render(scene, "shadow-planes").airlight, reference) < 5e-5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of shadow planes against the quadrature truth on exact geometry, which shares no code with them."""
+"""Frames of shadow planes against the quadrature reference on exact geometry, which shares no code with them."""
 
 import mitsuba as mi
 import numpy as np
@@ -41,7 +41,7 @@ def scene_with(mesh, *, size=(24, 18), **changes):
     return mi.load_dict(scene)
 
 
-def truth(scene):
+def reference(scene):
     return quadrature_image(read_reference(scene))
 
 
@@ -61,8 +61,8 @@ def assert_is_reference(frame, image, *, rmse=1e-5):
 def surface_differs(frame, image):
     """The share of pixels whose surface is lit in one and dark in the other.
 
-    The truth's shadow rays start 1e-4 m above the surface and are cast in float32: at the edge of a shadow they and the
-    planes may differ by a pixel.
+    The reference's shadow rays start 1e-4 m above the surface and are cast in float32: at the edge of a shadow they and
+    the planes may differ by a pixel.
     """
     return np.mean(np.any(np.abs(frame.surface - image.surface) > 1e-2 * image.surface.mean(), axis=2))
 
@@ -71,7 +71,7 @@ def surface_differs(frame, image):
 @pytest.mark.parametrize("name", ALL)
 def test_every_mesh(variant, name):
     scene = scene_with(ALL[name]())
-    frame, image = render(scene, "shadow-planes"), truth(scene)
+    frame, image = render(scene, "shadow-planes"), reference(scene)
     # float32 kernels and crossings: 1e-6, a hundredth of what is asked of a frame.
     assert_is_reference(frame, image, rmse=5e-6)
     assert surface_differs(frame, image) < 0.005
@@ -81,7 +81,7 @@ def test_every_mesh(variant, name):
 @pytest.mark.parametrize("change", CHANGES)
 def test_every_place_and_light(variant, change):
     scene = scene_with(SOUND["torus"](), **CHANGES[change]())
-    frame, image = render(scene, "shadow-planes"), truth(scene)
+    frame, image = render(scene, "shadow-planes"), reference(scene)
     assert_is_reference(frame, image)
     assert surface_differs(frame, image) < 0.005
 

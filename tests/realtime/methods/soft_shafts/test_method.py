@@ -97,11 +97,11 @@ def test_pixels_share_points_and_steps(variant):
 @pytest.mark.claim("soft-shafts-steps", tolerance="half of the light; 2 % of it")
 def test_equal_steps_miss_the_peak_next_to_a_light_and_equal_angles_do_not(variant):
     loaded = load_scene("random:1", (80, 60)).scene
-    truth, scene = reference_image(loaded).airlight.mean(), read_scene(loaded)
+    reference, scene = reference_image(loaded).airlight.mean(), read_scene(loaded)
 
     def missing(**settings):
         renderer = prepared(scene, configuration("soft-shafts", None, settings))
-        return 1 - float(np.mean(np.asarray(render_frame(renderer).airlight))) / truth
+        return 1 - float(np.mean(np.asarray(render_frame(renderer).airlight))) / reference
 
     assert missing() > 0.5
     assert abs(missing(spacing="equiangular")) < 0.02

@@ -32,13 +32,13 @@ def reference_of(scene):
 
 def summed(scene, parts, *, steps=500, **how):
     """Sum the airlight over small steps of every chord."""
-    truth = reference_of(scene)
-    lamp = airlight_sum.Light(truth.lights[0].position, 1.0, truth.lights[0].intensity)
+    reference = reference_of(scene)
+    lamp = airlight_sum.Light(reference.lights[0].position, 1.0, reference.lights[0].intensity)
     image = [
-        airlight_sum.airlight_sum(truth.origin, direction, lamp, parts, steps=steps, **how)
-        for direction in truth.direction
+        airlight_sum.airlight_sum(reference.origin, direction, lamp, parts, steps=steps, **how)
+        for direction in reference.direction
     ]
-    return np.array(image).reshape(truth.height, truth.width, 3)
+    return np.array(image).reshape(reference.height, reference.width, 3)
 
 
 @pytest.mark.claim("bounded-media-of-methods", tolerance="relative RMSE 3e-5")
@@ -72,15 +72,15 @@ def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
     seen = render(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
     clear = render(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.0)))
     assert np.array_equal(seen.distance, clear.distance)
-    truth = reference_of(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
+    reference = reference_of(clear_scene(floor=floor, ball=fog_sphere(SPHERE_AT, RADIUS)))
     distance = seen.distance.ravel()
     hit = np.isfinite(distance) & (clear.surface[..., 0].ravel() > 0)
-    point = truth.origin + distance[hit, None] * truth.direction[hit]
-    light = truth.lights[0].position
+    point = reference.origin + distance[hit, None] * reference.direction[hit]
+    light = reference.lights[0].position
     way = np.linalg.norm(point - light, axis=1)
     length = np.zeros(len(point))
     for origin, towards, end in (
-        (truth.origin, truth.direction[hit], distance[hit]),
+        (reference.origin, reference.direction[hit], distance[hit]),
         (light, (point - light) / way[:, None], way),
     ):
         near, far = np.clip(SPHERE.chord(origin, towards), 0, end)
@@ -94,8 +94,8 @@ def test_surfaces_are_seen_and_lit_through_bounded_media(variant):
 def test_an_ambient_field_fills_bounded_media(variant):
     scene = clear_scene(ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.7))
     gain = render(scene, "shadow-planes", ambient=0.3).airlight - render(scene, "shadow-planes").airlight
-    truth = reference_of(scene)
-    near, far = SPHERE.chord(truth.origin, truth.direction)
+    reference = reference_of(scene)
+    near, far = SPHERE.chord(reference.origin, reference.direction)
     chord = far - near
     expected = 0.3 * np.array([0.9, 0.4, 0.3]) * (1 - np.exp(-0.7 * chord))[:, None]
     assert gain.reshape(-1, 3) == pytest.approx(expected, abs=1e-6)
@@ -122,13 +122,13 @@ def test_refusals_name_what_is_in_the_way(variant, changes, message):
         pytest.param("random:146", 1e-5, marks=pytest.mark.slow),
     ],
 )
-def test_random_scenes_against_the_truth(variant, scene, bound):
+def test_random_scenes_against_the_reference(variant, scene, bound):
     """What sweeps found; the error before, at 160 x 120, and at rays that meet edges what is left.
 
     Legs graze spheres in the fog around them (2: 9e-5); light from infinity bends at the 72 facets of two bodies (84:
     1.7e-3); legs pass edges of boxes on their way to fog and other boxes (146: 1.2e-3).
     """
     loaded = load_scene(scene, (64, 48)).scene
-    truth = reference_image(loaded).airlight
+    reference = reference_image(loaded).airlight
     frame = render_frame(prepared(read_scene(loaded), configuration("shadow-planes")))
-    assert relative_rmse(frame.airlight, truth) < bound
+    assert relative_rmse(frame.airlight, reference) < bound

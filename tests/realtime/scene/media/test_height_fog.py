@@ -169,15 +169,15 @@ def frame(scene, method, kernel=exact, **parameters):
 @pytest.mark.parametrize("lights", [(LAMP, SPOT), (SUN,)], ids=["local", "sun"])
 def test_frames_are_the_reference(scene, lights):
     loaded = scene(*lights)
-    truth = quadrature_image(read_reference(loaded), checks=0)
+    reference = quadrature_image(read_reference(loaded), checks=0)
     planes = frame(loaded, "shadow-planes")
-    assert relative_rmse(planes.airlight, truth.airlight) < 1e-5
-    assert relative_rmse(planes.surface, truth.surface) < 1e-4
+    assert relative_rmse(planes.airlight, reference.airlight) < 1e-5
+    assert relative_rmse(planes.surface, reference.surface) < 1e-4
     # Maps and steps: some percent at their defaults.
     for method, error in (("light-volumes", 0.02), ("min-max", 0.05), ("ray-march", 0.1)):
-        assert relative_rmse(frame(loaded, method).airlight, truth.airlight) < error, method
+        assert relative_rmse(frame(loaded, method).airlight, reference.airlight) < error, method
     even = frame(loaded, "ray-march", spacing="uniform", steps=1000)
-    assert relative_rmse(even.airlight, truth.airlight) < 0.1
+    assert relative_rmse(even.airlight, reference.airlight) < 0.1
 
 
 @pytest.mark.claim("height-fog-methods", tolerance="a running sum errs by the square of its step")
@@ -200,9 +200,9 @@ def test_a_running_sum_of_the_depth(scene):
 @pytest.mark.parametrize("name", ["street", "meadow", "valley"])
 def test_built_in_scenes(variant, name):
     loaded = load_scene(name, (24, 18)).scene
-    truth = quadrature_image(read_reference(loaded))
-    assert truth.airlight_bound.max() < 1e-6 * truth.airlight.mean()
-    assert relative_rmse(frame(loaded, "shadow-planes").airlight, truth.airlight) < 1e-5
+    reference = quadrature_image(read_reference(loaded))
+    assert reference.airlight_bound.max() < 1e-6 * reference.airlight.mean()
+    assert relative_rmse(frame(loaded, "shadow-planes").airlight, reference.airlight) < 1e-5
 
 
 @pytest.mark.claim("height-fog-refused", tolerance="by name")

@@ -52,7 +52,7 @@ def check_equal(first, second):
 
 @pytest.mark.statistical
 @pytest.mark.claim(
-    "hypertexture-truth", tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance"
+    "hypertexture-reference", tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance"
 )
 def test_an_even_grid_is_a_homogeneous_cloud(variant):
     """Half the largest density everywhere but in a corner without cloud: flights end where nothing is."""

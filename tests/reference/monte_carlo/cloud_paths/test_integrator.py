@@ -153,10 +153,10 @@ def slab_reference(clouds):
 )
 def test_the_slab_is_that_of_disort(variant):
     clouds = slab_clouds()
-    truth = slab_reference(clouds)
+    reference = slab_reference(clouds)
     batches = paths(clouds, 32, 256)
-    z = ((batches.mean[0] - truth) / batches.standard_error[0])[:, 1]
-    assert np.all(batches.standard_error[0] < 0.06 * truth)
+    z = ((batches.mean[0] - reference) / batches.standard_error[0])[:, 1]
+    assert np.all(batches.standard_error[0] < 0.06 * reference)
     # A z of 32 batches has the variance 31/29.
     assert chi2.sf((z**2).sum() * 29 / 31, len(z)) > 1e-4
     assert abs(z.sum()) / math.sqrt(len(z)) < 4
@@ -167,14 +167,14 @@ def test_the_slab_is_that_of_disort(variant):
 @pytest.mark.claim(
     "cloud-paths-standard-errors", tolerance="95 % intervals of 32 batches hold DISORT's radiance: 91 to 98 %"
 )
-def test_standard_errors_cover_the_truth_as_often_as_they_say(variant):
+def test_standard_errors_cover_the_reference_as_often_as_they_say(variant):
     """24 runs of 12 directions: 288 intervals, of which 88.7 % to 98 % hold by chance at a level of 1e-4 or so."""
     clouds = slab_clouds()
-    truth = slab_reference(clouds)[:, 1]
+    reference = slab_reference(clouds)[:, 1]
     held = []
     for run in range(24):
         batches = paths(clouds, 32, 64, first=1000 + 32 * run)
-        z = (batches.mean[0][:, 1] - truth) / batches.standard_error[0][:, 1]
+        z = (batches.mean[0][:, 1] - reference) / batches.standard_error[0][:, 1]
         held.append(np.abs(z) < t.ppf(0.975, 31))
     share = np.mean(held)
     spread = math.sqrt(0.95 * 0.05 / np.size(held))

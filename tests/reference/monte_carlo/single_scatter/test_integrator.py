@@ -26,10 +26,10 @@ def _load(**changes):
 
 
 def _run(scene, *, samples=64, first_seed=0, batches=_BATCHES):
-    truth = read_reference(scene)
-    done = single_scatter_batch(truth, first_seed, samples)
+    reference = read_reference(scene)
+    done = single_scatter_batch(reference, first_seed, samples)
     for seed in range(first_seed + 1, first_seed + batches):
-        done = merged(done, single_scatter_batch(truth, seed, samples))
+        done = merged(done, single_scatter_batch(reference, seed, samples))
     return done
 
 
@@ -94,9 +94,9 @@ def test_agrees_with_the_quadrature(variant, name):
     below 0.1 %; surfaces, which need no sampling, to the rounding of single precision.
     """
     scene = _load(**_case(name))
-    truth = quadrature_image(read_reference(scene))
+    reference = quadrature_image(read_reference(scene))
     batches = _run(scene)
-    expected = truth.airlight.reshape(-1, 3)
+    expected = reference.airlight.reshape(-1, 3)
     mean, error = batches.mean[0], batches.standard_error[0]
     _assert_agrees(mean, error, expected, batches=_BATCHES, largest_error=0.01)
     for channel in range(3):
@@ -105,7 +105,7 @@ def test_agrees_with_the_quadrature(variant, name):
         assert pooled < 1e-3
         assert abs(mean[:, channel].sum() / total - 1) < 4 * pooled + 1e-6
     # A pixel at the terminator or on an edge of a shadow may fall on either side: none does in these scenes.
-    assert batches.mean[1] == pytest.approx(truth.surface.reshape(-1, 3), rel=5e-6, abs=1e-12)
+    assert batches.mean[1] == pytest.approx(reference.surface.reshape(-1, 3), rel=5e-6, abs=1e-12)
     assert np.all(batches.standard_error[1] == 0)
 
 

@@ -71,12 +71,12 @@ def test_a_panel_in_height_fog(variant, tmp_path):
 def compare(tmp_path, medium, light, traces, *, samples):
     path = tmp_path / "scene.xml"
     path.write_text(scene_file(medium, light, path))
-    truth = read_reference(load_scene(str(path)).scene)
-    image = quadrature_image(truth, checks=0)
+    reference = read_reference(load_scene(str(path)).scene)
+    image = quadrature_image(reference, checks=0)
     known = image.replicate_means.mean(axis=1)[:, 0]
     of_known = image.replicate_means.std(axis=1, ddof=1)[:, 0] / np.sqrt(image.replicate_means.shape[1])
     for trace, count, most in traces:
-        means = np.array([trace(truth, seed, samples).mean.mean(axis=1)[:, 0] for seed in range(count)])
+        means = np.array([trace(reference, seed, samples).mean.mean(axis=1)[:, 0] for seed in range(count)])
         error = np.hypot(of_known, means.std(axis=0, ddof=1) / np.sqrt(count))
         assert (np.abs(means.mean(axis=0) - known) < 4 * error).all(), trace.__name__
         assert (error < np.array([most, 2 * most]) * known).all(), trace.__name__

@@ -10,21 +10,21 @@ from tests.helpers.volpath import assert_volpath_agrees
 
 
 @pytest.fixture(scope="module")
-def truth(variant):
+def reference(variant):
     return read_reference(mi.load_dict(tiny_scene()))
 
 
-def test_one_kernel_serves_any_number_of_samples(truth):
+def test_one_kernel_serves_any_number_of_samples(reference):
     """Rationale: a kernel is compiled anew for how the memory lies that it reads, and NumPy's lies anywhere."""
-    kernels = [_large_kernels(truth, samples=samples, seed=samples) for samples in (3, 4, 5, 8)]
+    kernels = [_large_kernels(reference, samples=samples, seed=samples) for samples in (3, 4, 5, 8)]
     assert len(set(map(tuple, kernels))) == 1
 
 
-def _large_kernels(truth, *, samples, seed=0):
+def _large_kernels(reference, *, samples, seed=0):
     """Return the hashes of the kernels of a batch that trace paths, in the order of their launches."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
-        volpath_batch(truth, seed, samples)
+        volpath_batch(reference, seed, samples)
         return [each["hash"] for each in dr.kernel_history((dr.KernelType.JIT,)) if each["operation_count"] > 1000]
 
 
@@ -41,5 +41,5 @@ def test_agrees_with_the_quadrature(variant, colour):
     fog = tiny_scene()["fog"]
     if colour == "coloured":
         fog |= {"sigma_t": {"type": "rgb", "value": [0.1, 0.3, 0.7]}, "has_spectral_extinction": True}
-    truth = read_reference(mi.load_dict(tiny_scene(fog=fog)))
-    assert_volpath_agrees(truth, batches=32, least_precision=0.02)
+    reference = read_reference(mi.load_dict(tiny_scene(fog=fog)))
+    assert_volpath_agrees(reference, batches=32, least_precision=0.02)

@@ -26,17 +26,17 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
     for seed in seeds:
         loaded = load_scene(f"random:{seed}", (16, 12))
         drawn = drawn_values(loaded.name)
-        ours, truth = read_scene(loaded.scene), read_reference(loaded.scene)
+        ours, reference = read_scene(loaded.scene), read_reference(loaded.scene)
         assert len(ours.lights) + len(ours.area_lights) == len(drawn["lights"])
-        assert len(truth.lights) + len(truth.area) + len(truth.directional) == len(drawn["lights"])
+        assert len(reference.lights) + len(reference.area) + len(reference.directional) == len(drawn["lights"])
         bounded = [medium for medium in drawn["media"] if medium["bounds"] != "endless"]
-        assert len(truth.media) == len(bounded)
+        assert len(reference.media) == len(bounded)
         assert ours.features.clear == (len(bounded) == len(drawn["media"]))
         # What was drawn arrives, to the precision of the scene, single.
-        sigma = {medium.name: medium.sigma_t for medium in truth.media} | {"endless": truth.medium.sigma_t}
+        sigma = {medium.name: medium.sigma_t for medium in reference.media} | {"endless": reference.medium.sigma_t}
         for medium in drawn["media"]:
             np.testing.assert_allclose(sigma[medium["name"]], np.divide(medium["sigma_t"], drawn["scale"]), rtol=1e-6)
-        assert len(truth.occluders.shapes()) >= len(drawn["casters"])
+        assert len(reference.occluders.shapes()) >= len(drawn["casters"])
 
 
 @pytest.mark.claim("random-same", tolerance="none: the digests of two loads, and of the record kept here, are equal")

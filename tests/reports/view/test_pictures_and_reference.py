@@ -25,18 +25,18 @@ def test_error_of_a_part_covers_that_of_the_whole():
     flat, covered = reference.reshape(-1, 3), 0
     for seed in range(200):
         pixels = np.random.default_rng(seed).permutation(WIDTH * HEIGHT)[:400]
-        truth = KnownReference.of_size(WIDTH, HEIGHT)
-        truth.add(pixels, flat[pixels], flat[pixels], np.full((400, 3), 1e-9))
-        error = view_error(truth, test)
+        known = KnownReference.of_size(WIDTH, HEIGHT)
+        known.add(pixels, flat[pixels], flat[pixels], np.full((400, 3), 1e-9))
+        error = view_error(known, test)
         assert (error.known, error.pixels) == (400, WIDTH * HEIGHT)
         covered += abs(error.relative_rmse - whole.relative_rmse) <= error.interval
     assert 177 <= covered <= 200
-    truth.add(np.arange(WIDTH * HEIGHT), flat, flat, np.full((WIDTH * HEIGHT, 3), 3e-9))
-    error = view_error(truth, test)
+    known.add(np.arange(WIDTH * HEIGHT), flat, flat, np.full((WIDTH * HEIGHT, 3), 3e-9))
+    error = view_error(known, test)
     assert error.interval == 0
     assert error.relative_rmse == pytest.approx(whole.relative_rmse, rel=1e-12)
     assert error.bound == pytest.approx(3e-9 / reference.mean(), rel=1e-12)
-    np.testing.assert_array_equal(truth.filled(truth.airlight), reference)
+    np.testing.assert_array_equal(known.filled(known.airlight), reference)
 
 
 def test_a_picture_of_a_frame_is_the_preview_within_a_level_and_what_is_not_finite_is_magenta(variant):
