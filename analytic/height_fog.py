@@ -53,7 +53,7 @@ _WIDEST = 2.4  # of the first panels, in w
 _SCALE_HEIGHTS = 4.0  # that a first panel spans at most
 _MOST = 4096  # first panels of an interval
 _CHUNK = 4096  # panels evaluated at once
-_ENDLESS = 60.0  # beyond the foot in w: 1/cosh w has fallen to 1e-26
+_UNBOUNDED = 60.0  # beyond the foot in w: 1/cosh w has fallen to 1e-26
 
 
 @dataclass(frozen=True)
@@ -164,11 +164,11 @@ class HeightFog:
         start, end, length, rise = np.broadcast_arrays(
             *(np.asarray(v, dtype=np.float64) for v in (start, end, length, rise))
         )
-        endless = np.isinf(length)
-        finite = self.optical_depth(start, np.where(endless, start, end), np.where(endless, 0.0, length))
-        return np.where(endless, self.endless(start, rise), finite)
+        unbounded = np.isinf(length)
+        finite = self.optical_depth(start, np.where(unbounded, start, end), np.where(unbounded, 0.0, length))
+        return np.where(unbounded, self.unbounded(start, rise), finite)
 
-    def endless(self, z: ArrayLike, rise: ArrayLike) -> Array:
+    def unbounded(self, z: ArrayLike, rise: ArrayLike) -> Array:
         """Return the optical depth of rays without end from heights [m]; `rise`: vertical, of unit directions."""
         z, rise = np.broadcast_arrays(np.asarray(z, dtype=np.float64), np.asarray(rise, dtype=np.float64))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -256,8 +256,8 @@ def height_fog_sun(
         b = np.where(np.isinf(a), a, b)
         za, zb = (origin + np.where(level, 0.0, rise * x) for x in (a, b))
         tau = np.where(b > a, fog.along(za, zb, b - a, rise), 0.0)
-        first = fog.optical_depth(origin, za, a) + fog.endless(za, sun)
-        last = fog.along(origin, zb, b, rise) + np.where(np.isinf(zb) & (rise > 0), 0.0, fog.endless(zb, sun))
+        first = fog.optical_depth(origin, za, a) + fog.unbounded(za, sun)
+        last = fog.along(origin, zb, b, rise) + np.where(np.isinf(zb) & (rise > 0), 0.0, fog.unbounded(zb, sun))
         bend = 1 - rise / sun
         q = bend * tau
         from_first = np.exp(-first) * np.where(
@@ -300,8 +300,8 @@ def height_fog_segments(
     owner, low, high = owner[keep], low[keep], high[keep]
     rows = HeightRays(*(column[owner] for column in columns[:5]))
     start, _, width, height = log_distance(rows.foot, rows.height, low, high)
-    endless = np.maximum(-start, 0.0) + _ENDLESS
-    parts = _Parts(fog, rows, owner, start, np.minimum(width, endless), height)
+    unbounded = np.maximum(-start, 0.0) + _UNBOUNDED
+    parts = _Parts(fog, rows, owner, start, np.minimum(width, unbounded), height)
     evaluate = partial(_evaluate, parts, phase, shadow_scale, weight)
     value, error = adapted(_first_panels(parts, phase.kinks), evaluate, owner, count, rtol)
     value[through] = error[through] = np.inf

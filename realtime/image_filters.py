@@ -20,7 +20,7 @@ The width may differ from pixel to pixel. Then a pixel takes as many taps as its
 
 **The bilateral filter of an image that takes few values**, exactly, as a sum of Gaussians.
 
-A visibility by N light points takes the N + 1 values l / N. With W_l(p) the Gaussian of the image that is 1 where f is
+A visibility by N light samples takes the N + 1 values l / N. With W_l(p) the Gaussian of the image that is 1 where f is
 l / N and 0 elsewhere,
 
     g(p) = f(p) + sum_l G_hr(f(p) - l / N) (l / N - f(p)) W_l(p) / sum_l G_hr(f(p) - l / N) W_l(p):
@@ -287,7 +287,7 @@ def bilateral_of_levels(
     """Return `realtime.image_filters.bilateral` of an image of numbers with itself as its guide.
 
     `image`: numbers l / `levels` with l from 0 to `levels`, row by row; `raster`: its size; `levels`: N, the number of
-    light points; `hd`, `hr`: standard deviations [pixels], [1]; `hr` may be infinite; `support`: half side of the
+    light samples; `hd`, `hr`: standard deviations [pixels], [1]; `hr` may be infinite; `support`: half side of the
     square of taps [`hd`]; `there`: which pixels take part; the others, for instance the sky, change nothing and stay
     what they are.
     """

@@ -13,8 +13,8 @@ angles to d however close to the light the ray passes:
 
     w = c d;   e = fma(-c, d, w)   (the exact rounding error of w);   a b - c d = fma(a, b, -w) + e
 
-A light point with the normal n lights what lies before its plane, with the cosine of the angle to n for a profile. From
-the light to the point of the ray at x, s = x - foot from the foot, leads (v x d) x d + s d, hence
+A light sample with the normal n lights what lies before its plane, with the cosine of the angle to n for a profile.
+From the light to the point of the ray at x, s = x - foot from the foot, leads (v x d) x d + s d, hence
 
     r cos = axial s + offset,     axial = n . d,     offset = n . ((v x d) x d).
 
@@ -145,20 +145,20 @@ class RayGeometry:
 
     foot: Any  #: signed distance along the ray of the foot of the perpendicular from the light [m]; w = 0: a cosine
     height: Any  #: distance from the light to the ray [m]; w = 0: a sine
-    axial: Any = None  #: spot, light point: cosine between the ray and the axis, or the normal
-    offset: Any = None  #: spot, light point: component along that of the vector from the light to the foot [m]
-    enter: Any = None  #: spot, light point: distance at which the ray enters what is lit, -inf if it misses it [m]
-    leave: Any = None  #: spot, light point: distance at which it leaves it, -inf if it misses it [m]
+    axial: Any = None  #: spot, light sample: cosine between the ray and the axis, or the normal
+    offset: Any = None  #: spot, light sample: component along that of the vector from the light to the foot [m]
+    enter: Any = None  #: spot, light sample: distance at which the ray enters what is lit, -inf if it misses it [m]
+    leave: Any = None  #: spot, light sample: distance at which it leaves it, -inf if it misses it [m]
     beam_enter: Any = None  #: soft spot only: the same for the cone of full intensity [m]
     beam_leave: Any = None
     slant: Any = None  #: soft spot only: sine between the ray and the axis
     slide: Any = None  #: soft spot only: slant times the distance from the foot to the point closest to the axis [m]
-    gap: Any = None  #: soft spot only: distance between the ray and the axis, as endless lines [m]
+    gap: Any = None  #: soft spot only: distance between the ray and the axis, as unbounded lines [m]
 
     def lit_segment(self, x0, x1) -> tuple[Any, Any]:
         """Return the part of [x0, x1] that the light could reach, x1 = x0 where there is none [m].
 
-        That is all of it, but for a spot, which lights what is inside its cone, and a light point, which lights what
+        That is all of it, but for a spot, which lights what is inside its cone, and a light sample, which lights what
         lies before its plane. `x1` may be infinite.
         """
         return (x0, x1) if self.enter is None else _clip(self.enter, self.leave, x0, x1)
@@ -172,7 +172,7 @@ class RayGeometry:
         """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; others are one piece.
 
         A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
-        Of an endless ray that stays in the beam the last piece, which is empty, lies at its beginning: at infinity
+        Of an unbounded ray that stays in the beam the last piece, which is empty, lies at its beginning: at infinity
         kernels would multiply 0 by infinity. Valid for any segment.
         """
         if light.beam is None:
@@ -186,7 +186,7 @@ class RayGeometry:
         return [(x0, inner0), (inner0, inner1), (dr.select(stays, x0, inner1), dr.select(stays, x0, x1))]
 
     def falloff_beside(self, light: Light, s):
-        """Return `falloff` at `s` = x - foot [m]: of a light point, close to which x has not the digits."""
+        """Return `falloff` at `s` = x - foot [m]: of a light sample, close to which x has not the digits."""
         if light.facing is None:
             return self.falloff(light, self.foot + s)
         square = dr.fma(s, s, dr.square(self.height))
@@ -195,7 +195,7 @@ class RayGeometry:
     def falloff(self, light: Light, x):
         """Return the relative intensity of a light at the point at `x`, for one that varies [1].
 
-        Of a light point it is the cosine at its normal, 0 behind its plane. Of a spot it is Mitsuba's profile, linear
+        Of a light sample it is the cosine at its normal, 0 behind its plane. Of a spot it is Mitsuba's profile, linear
         in the angle: one inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff -
         beam). The angle is that of the distances from the axis and along it: near the axis a cosine alone has lost it.
         """

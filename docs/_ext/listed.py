@@ -106,11 +106,11 @@ def parameters(method: str) -> str:
     return _fields(METHODS[method])
 
 
-def light_points() -> str:
+def light_samples() -> str:
     """Return a table of the parameters that all methods have for area lights."""
-    from realtime.area_lights.points import LightPoints
+    from realtime.area_lights.points import LightSamples
 
-    return _fields(LightPoints)
+    return _fields(LightSamples)
 
 
 def history() -> str:

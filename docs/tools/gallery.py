@@ -41,7 +41,7 @@ FOLDER = DOCS / "gallery"
 LIST = FOLDER / "gallery.json"
 REPORT = Path("airlight-report")  #: of which the picture of a page is
 LARGEST = 150_000  #: bytes of a file
-COARSER = 3  #: by which error maps of lights with extent are coarser
+COARSER = 3  #: by which error maps of area lights are coarser
 
 Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 SIZE, SMALL = (640, 480), (480, 360)
@@ -176,7 +176,7 @@ def _pixels(picture: Picture) -> tuple[Pixels, dict[str, Any]]:
         return _rendered(picture, SIZE), {}
     if picture.kind == "method":
         return _rendered(picture, SMALL), {}
-    # The reference of a light with extent takes minutes: a third of the pixels along each side, drawn larger.
+    # The reference of an area light takes minutes: a third of the pixels along each side, drawn larger.
     coarser = COARSER if read_scene(load_scene(picture.scene, (8, 6)).scene).area_lights else 1
     loaded, frame = _frame(picture, (SMALL[0] // coarser, SMALL[1] // coarser))
     reference = reference_image(loaded.scene).airlight

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light points, and the patterns in which they lie.
+"""Light samples, and the patterns in which they lie.
 
 **Patterns of points, each for an equal part of the area.**
 
@@ -18,7 +18,7 @@
 * `interleaved`: the cells of `grid` in an order in which points that follow one another lie far apart: for a method in
   which neighbouring pixels take different ones. For all others it is `grid`.
 
-**Light points:** a light with extent as N point lights of equal power.
+**Light samples:** an area light as N point lights of equal power.
 
 Each stands for the part A/N of the area: a point light with the intensity I(w) = I0 max(0, n . w), I0 = Le A/N [W/sr],
 n the normal of the shape there. Its power, pi I0, is an N-th of that of the light.
@@ -120,10 +120,10 @@ _NEAR = 4e-6  #: of the largest coordinate: how far off the shape rays start, so
 
 
 @dataclass(frozen=True)
-class LightPoints(Parameters):
-    """How a method renders lights with extent; without effect where there are none."""
+class LightSamples(Parameters):
+    """How a method renders area lights; without effect where there are none."""
 
-    points: int = parameter(16, "points of equal power that stand for each light with extent", least=1, most=4096)
+    points: int = parameter(16, "points of equal power that stand for each area light", least=1, most=4096)
     pattern: str = parameter(
         "sobol",
         "where they lie: on a ring, as in Ali 2016; in the middles of a grid; Sobol's sequence; or the grid in the "
@@ -134,7 +134,7 @@ class LightPoints(Parameters):
 
 @dataclass(frozen=True)
 class PlacedPoints:
-    """The light points of one light, on the host."""
+    """The light samples of one light, on the host."""
 
     positions: Array  #: (points, 3) [m]
     normals: Array  #: unit vectors, (points, 3)
@@ -144,14 +144,14 @@ class PlacedPoints:
 
 
 def place_points(light: AreaLight, points: int, pattern: str) -> PlacedPoints:
-    """Return the light points of a light.
+    """Return the light samples of a light.
 
-    `light`: the light with extent; `points`: how many, 1 to 4096; `pattern`: one of
+    `light`: the area light; `points`: how many, 1 to 4096; `pattern`: one of
     `realtime.area_lights.points.PATTERNS`. Raises InputError for a number or a pattern that there is not.
 
     Valid for all lights. One point of a sphere lights a half space alone; a few points are needed there.
     """
-    LightPoints(points, pattern)
+    LightSamples(points, pattern)
     if light.kind == "mesh":
         positions, normals = _on_mesh(light, points, pattern)
     elif light.kind == "sphere":

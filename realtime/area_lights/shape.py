@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent: their record, their triangles, and how they are read from Mitsuba's `area` emitters.
+"""Area lights: their record, their triangles, and how they are read from Mitsuba's `area` emitters.
 
 Every point of the surface sends the same radiance Le into all directions of the half space before it. An element dA has
 the intensity Le cos dA in a direction at an angle whose cosine to the normal is cos, and the power pi Le dA. The shape
@@ -26,7 +26,7 @@ KINDS = ("rectangle", "disk", "sphere", "mesh")
 
 @dataclass(frozen=True)
 class AreaLight:
-    """A light with extent, on the host, in float64.
+    """An area light, on the host, in float64.
 
     A point of a rectangle or disk is middle + u across + v up, u and v from -1 to 1, for a disk with u^2 + v^2 <= 1.
     Middle and axes of a mesh are those of a ball around it.
@@ -80,7 +80,7 @@ def turned_area_light(light: AreaLight, about: Array, turn: Array) -> AreaLight:
 _SIDES, _RINGS = 64, 32
 
 
-def caster_vertices(light: AreaLight) -> Array:
+def occluder_vertices(light: AreaLight) -> Array:
     """Return the vertices of the triangles of a light, (vertices, 3) [m]."""
     if light.kind == "mesh":
         return light.vertices
@@ -99,7 +99,7 @@ def caster_vertices(light: AreaLight) -> Array:
     return np.concatenate([*rings, [light.middle + wide * pole, light.middle - wide * pole]])
 
 
-def caster_triangles(light: AreaLight) -> NDArray[np.int64]:
+def occluder_triangles(light: AreaLight) -> NDArray[np.int64]:
     """Return the numbers of the vertices of its triangles, (triangles, 3)."""
     if light.kind == "mesh":
         return light.triangles

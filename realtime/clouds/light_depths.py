@@ -116,7 +116,7 @@ def light_depths(
 
     nothing = dr.zeros(mi.UInt32, SIZE * SIZE), dr.zeros(Float, SIZE * SIZE)
     march(surfaces, origin, direction, last, nothing, step=to_layer, add=add, active=there)
-    # Layers in clear air, where no step ends, have what the one before them has.
+    # Layers in vacuum, where no step ends, have what the one before them has.
     lengths = dr.block_prefix_reduce(dr.ReduceOp.Max, lengths, LAYERS + 1, exclusive=False)
     arrays = []
     for distance in (first, last):

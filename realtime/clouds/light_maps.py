@@ -286,7 +286,7 @@ def shade(light_map: LightMap, point, width: Metres) -> tuple[PerRay, Metres]:
 def length_along_light(light_map: LightMap, point, active: Any = True) -> Metres:
     """Return how much of the way of the light to points lies in a cloud [m].
 
-    From its first surface to the point, or to its last: what lies between both is cloud, also clear air between two
+    From its first surface to the point, or to its last: what lies between both is cloud, also vacuum between two
     lobes (Bouthors 2008, section 7). Parameters are those of `filtered_surface`; here the surface is that of the finest
     level.
     """

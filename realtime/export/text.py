@@ -26,7 +26,7 @@ from realtime.scene.rule_reach import PANEL_DEPTH, PANEL_NODES
 
 _LN2_HIGH = 355 / 512  # nine bits of ln 2
 _ROOT_HALF = 0x3F3504F3  # bits of the float32 sqrt(1/2)
-_ENDLESS = 1e30  # x1 [m] beyond which a ray has no end
+_UNBOUNDED = 1e30  # x1 [m] beyond which a ray has no end
 
 #: The largest relative error of `exact` on any device that keeps the bounds of Vulkan; a test runs the text with every
 #: operation as wrong as they permit.
@@ -195,7 +195,7 @@ def _interval(tail: str) -> str:
     float reach = min({_number(OPTICAL_REACH)} / max(sigma_t * h, 1e-37), 1e7 * ({tail} + e0));
     float e1 = e0 + reach;
     float difference = reach;
-    if (x1 <= {_ENDLESS:g}) {{
+    if (x1 <= {_UNBOUNDED:g}) {{
         float s1 = x1 - foot;
         float r1 = sqrt(s1 * s1 + h * h);
         float end = al_path(s1, r1, h);

@@ -29,7 +29,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.area_lights.points import LightPoints
+from realtime.area_lights.points import LightSamples
 from realtime.errors import InputError
 from realtime.frame.adaptive_sampling import Corners, adaptive_layers, tile_corners
 from realtime.frame.history import HistoryPass
@@ -42,7 +42,7 @@ from realtime.numerics.noise import Noise, blue_mask
 from realtime.numerics.recorded import Frozen, prepare_kernel, refusals, with_tables
 from realtime.parameters import values
 from realtime.scene.camera import TILE, tiled_pixels
-from realtime.scene.light_points import with_light_points
+from realtime.scene.light_samples import with_light_samples
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
 
@@ -84,7 +84,7 @@ class FrameRenderer:
 
     scene: Scene
     method: Method
-    light_points: LightPoints
+    light_samples: LightSamples
     pixel: PerRay  #: pixel numbers in the order of the lanes
     structures: Mapping[Any, Stages]  #: by what lights have
     tables: Any  #: what the kernel reads; None for most
@@ -150,11 +150,11 @@ def frame_renderer(
     `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an airlight kernel
     function; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have the further layers that the
     method names; in a scene with area lights they have not. In others all lights are in one group then; `parameters`:
-    values of the method's parameters, and of `realtime.area_lights.points.LightPoints`; the others have their defaults.
-    Raises InputError for a parameter that the method does not have, where a kernel is missing, and for what the method
-    refuses of the scene; what it or the kernel refuses of the rays comes with the first frame.
+    values of the method's parameters, and of `realtime.area_lights.points.LightSamples`; the others have their
+    defaults. Raises InputError for a parameter that the method does not have, where a kernel is missing, and for what
+    the method refuses of the scene; what it or the kernel refuses of the rays comes with the first frame.
     """
-    chosen, light_points = method_parameters(method, parameters)
+    chosen, light_samples = method_parameters(method, parameters)
     if chosen.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
     _check_clouds(scene, chosen)
@@ -163,7 +163,7 @@ def frame_renderer(
     made = FrameRenderer(
         scene,
         chosen,
-        light_points,
+        light_samples,
         pixel,
         structures={},
         tables=prepare_kernel(kernel, type(scene.camera.origin.x)) if chosen.uses_kernel else None,
@@ -221,7 +221,7 @@ def _check_clouds(scene: Scene, method: Method) -> None:
         return
     if scene.medium.clouds is None:
         raise InputError(
-            f"method {name}: the scene has no clouds; wanted media with closed bounds in clear air: give the medium "
+            f"method {name}: the scene has no clouds; wanted media with closed bounds in vacuum: give the medium "
             "bounds, or use another method"
         )
     if near:
@@ -238,8 +238,8 @@ def _structure(lights: tuple[Light, ...]) -> tuple[tuple[bool, ...], ...]:
 
 def _lights_by_group(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
     """Return the lights of a scene by groups."""
-    scene, points = renderer.scene, renderer.light_points
-    lit = with_light_points(scene, points.points, points.pattern) if scene.area_lights else scene
+    scene, points = renderer.scene, renderer.light_samples
+    lit = with_light_samples(scene, points.points, points.pattern) if scene.area_lights else scene
     if renderer.method.at_once or renderer.extra_layers:
         return [lit.lights]
     groups = [scene.lights] if scene.lights else []
@@ -468,7 +468,7 @@ def _sphere_scales(renderer: FrameRenderer, groups: tuple[LightGroup, ...], cast
     assert renderer.sphere_scales is not None
     for number, light in enumerate(scene.area_lights):
         if light.kind == "sphere":
-            sphere = sampled_sphere(light, renderer.light_points, type(scene.camera.origin.x))
+            sphere = sampled_sphere(light, renderer.light_samples, type(scene.camera.origin.x))
             like = next(group.lights[0] for group in groups if group.scene.lights[0].source == number)
             shown = scene.camera, renderer.pixel, scene.medium, like, sphere, cast.distance, renderer.tables
             scales[number] = renderer.sphere_scales(*shown)

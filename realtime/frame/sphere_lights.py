@@ -24,7 +24,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.area_lights.points import LightPoints, place_points
+from realtime.area_lights.points import LightSamples, place_points
 from realtime.area_lights.shape import AreaLight
 from realtime.methods.interface.method import Method, View, camera_view
 from realtime.numerics.array_types import aligned_array, types_of
@@ -84,7 +84,7 @@ def sphere_scales(scene: Scene, method: Method, kernel: Any) -> Frozen | None:
     return Frozen(scale)
 
 
-def sampled_sphere(light: AreaLight, points: LightPoints, Float: Any) -> SampledSphere:
+def sampled_sphere(light: AreaLight, points: LightSamples, Float: Any) -> SampledSphere:
     """Return a sphere light as `sphere_scales` asks for it."""
     normals = place_points(light, points.points, points.pattern).normals
     Vector = types_of(Float).vector

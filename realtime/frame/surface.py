@@ -118,7 +118,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
 
 
 def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Sequence[Light], depths, shadows: bool):
-    """Return the sum of `lit_surface` over the points of a light with extent [W/(m^2 sr)].
+    """Return the sum of `lit_surface` over the points of an area light [W/(m^2 sr)].
 
     What they have in common is taken out of the sum: their intensity, the albedo and the leg to the eye.
 
@@ -163,7 +163,7 @@ def surface_stages(
     """Return the stages for a scene.
 
     `scene`: the scene; what matters is what cannot move; `provides_visibility`: whether the method finds out which
-    surfaces are lit; `by_source`: whether it does so for all points of a light with extent together; `through_media`:
+    surfaces are lit; `by_source`: whether it does so for all points of an area light together; `through_media`:
     whether the bounded media dim the surfaces; if not, the method says how much they do. Returns `surface`: (geometry,
     facets, pixel, camera, medium, lights) -> what camera rays meet, and what `shade` returns; `shade`: (geometry,
     facets, pixel, camera, medium, lights, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:

@@ -78,7 +78,7 @@ def closed_form(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light
         )
     if light.varies:
         raise InputError(
-            "kernel closed-form: a spot that falls off between beam and cut-off, or a light with extent, has no closed "
+            "kernel closed-form: a spot that falls off between beam and cut-off, or an area light, has no closed "
             "form here; use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
     foot, h = geometry.foot, geometry.height

@@ -245,7 +245,7 @@ def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
     """Return the airlight integral J to the accuracy of the arithmetic [1/m].
 
     Valid for any extinction (vacuum included), any ray, the light beside the segment (height 0) included, any segment,
-    endless ones and those of length 0 included, and |g| < 1. Where the ray meets the light (height 0) on the segment,
+    unbounded ones and those of length 0 included, and |g| < 1. Where the ray meets the light (height 0) on the segment,
     its ends included, the integral is infinite, and so is the result.
 
     Largest relative error found on the certified cases: see `airlight study integrals`; in float32 below 3e-5 for

@@ -87,7 +87,7 @@ def table(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, s
         )
     if light.varies:
         raise InputError(
-            "kernel table: a spot that falls off between beam and cut-off, or a light with extent, is not tabulated; "
+            "kernel table: a spot that falls off between beam and cut-off, or an area light, is not tabulated; "
             "use the kernel 'quadrature', or a spot with beam_width = cutoff_angle"
         )
     if dr.grad_enabled((geometry.foot, geometry.height, x0, x1), medium.sigma_t):

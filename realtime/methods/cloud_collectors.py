@@ -449,8 +449,8 @@ def _reaching(view: View, of_sun: LightMap, sigma_t: Any, entry: _Entry, sun: in
 
     def behind(number, share):
         cover, length = shade(of_sun.of_cloud(number), centre, collector.width)
-        dimmed = 1 - cover * (1 - dr.exp(-dr.gather(Float, sigma_t, number) * length))
-        return number + 1, dr.select(number == entry.cloud, share, share * dimmed)
+        attenuated = 1 - cover * (1 - dr.exp(-dr.gather(Float, sigma_t, number) * length))
+        return number + 1, dr.select(number == entry.cloud, share, share * attenuated)
 
     if clouds > 1:
         lanes = dr.width(centre)

@@ -105,7 +105,7 @@ class RayMarch(Method):
         return self.shadow == "ray"
 
     def check(self, scene):
-        """Refuse maps that have no room, and uniform steps on an endless ray through a vacuum."""
+        """Refuse maps that have no room, and uniform steps on an unbounded ray through a vacuum."""
         if self.spacing == "uniform" and scene.features.vacuum and not scene.medium.clear:
             raise InputError(
                 "spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular"

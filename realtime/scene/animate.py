@@ -15,13 +15,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.shape import AreaLight, caster_vertices
+from realtime.area_lights.shape import AreaLight, occluder_vertices
 from realtime.errors import InputError
 from realtime.numerics.array_types import aligned_array, types_of
 from realtime.scene.directional_extent import directional_fields, extent_spheres
 from realtime.scene.lights import DirectionalExtent, Light
 from realtime.scene.media.medium import Medium
-from realtime.scene.mesh_adjacency import Casters
+from realtime.scene.mesh_adjacency import Occluders
 from realtime.scene.read_scene import Scene
 from realtime.scene.triangle_table import Facets, read_facets, with_rotations
 
@@ -67,12 +67,12 @@ def _rotated(colour: Array, share: float) -> Array:
 
 
 def coloured_area_light(light: AreaLight, share: float) -> AreaLight:
-    """Return a light with extent whose red, green and blue rotate by a share of a turn; their sum stays."""
+    """Return an area light whose red, green and blue rotate by a share of a turn; their sum stays."""
     return replace(light, radiance=_rotated(light.radiance, share))
 
 
 def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
-    """Return a scene with its lights with extent elsewhere; the shapes of black ones move in its Mitsuba scene."""
+    """Return a scene with its area lights elsewhere; the shapes of black ones move in its Mitsuba scene."""
     black = [light for light in area_lights if light.opaque]
     if not black:
         return replace(scene, area_lights=tuple(area_lights))
@@ -88,7 +88,7 @@ def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:
         matrix[:3] = np.stack([light.across, light.up, third, light.middle], axis=1)
         parameters[key] = type(parameters[key])(mi.Matrix4f(matrix.astype(np.float32)))
     parameters.update()
-    moved = {light.name: caster_vertices(light) for light in black}
+    moved = {light.name: occluder_vertices(light) for light in black}
     return replace(scene, area_lights=tuple(area_lights), positions={**scene.positions, **moved})
 
 
@@ -172,10 +172,10 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
     return replace(scene, positions={**scene.positions, **positions}, facets=facets)
 
 
-def closed_shapes(casters: Casters) -> tuple[str, ...]:
+def closed_shapes(occluders: Occluders) -> tuple[str, ...]:
     """Return the names of the shapes all of whose components are closed: things, not floors and walls."""
-    closed = [casters.closed[casters.owner == number] for number in range(len(casters.shapes))]
-    return tuple(name for (name, _, _), own in zip(casters.shapes, closed) if len(own) and own.all())
+    closed = [occluders.closed[occluders.owner == number] for number in range(len(occluders.shapes))]
+    return tuple(name for (name, _, _), own in zip(occluders.shapes, closed) if len(own) and own.all())
 
 
 def _like(old, values):

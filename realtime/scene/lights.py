@@ -9,7 +9,7 @@ its shadow map (`realtime.shadow_maps.projection`), silhouettes and shadow plane
 What a directional light lights is media with bounds; the middle of the rectangle across it where these end stands for
 its place (`realtime.scene.directional_extent`).
 
-A light point stands for a part of a light with extent (`realtime.area_lights`). In the direction w it has the intensity
+A light sample stands for a part of an area light (`realtime.area_lights`). In the direction w it has the intensity
 I0 max(0, n . w), n its normal: it lights the half space before its plane.
 """
 
@@ -49,7 +49,7 @@ class DirectionalExtent:
 
 @dataclass(frozen=True)
 class Facing:
-    """What only a light point has: how the part of a shape that it stands for faces."""
+    """What only a light sample has: how the part of a shape that it stands for faces."""
 
     exact_normal: Any  #: unit normal of the shape, on the side that shines, in float64
     lift: Any  #: how far before the shape rays start, so that they do not meet it [m]
@@ -72,8 +72,8 @@ class Light:
     beam: Any = None  #: soft spot: the `Cone` in which the intensity is full
     inverse_transition: Any = None  #: soft spot: 1 / (cutoff - beam) [1/rad]
     extent: Any = None  #: directional: the `DirectionalExtent` through which all light of the media comes
-    facing: Facing | None = None  #: light point: how its shape faces
-    source: int | None = None  #: light point: the number of its light in `Scene.area_lights`
+    facing: Facing | None = None  #: light sample: how its shape faces
+    source: int | None = None  #: light sample: the number of its light in `Scene.area_lights`
     sky: Any = None  #: the radiance of a uniform sky, for which this light stands as a beam from above [W/(m^2 sr)]
 
     @property
@@ -83,7 +83,7 @@ class Light:
 
     @property
     def kind(self) -> str:
-        """Its name in messages and counts: 'point', 'spot', 'directional', or 'area' for a light point."""
+        """Its name in messages and counts: 'point', 'spot', 'directional', or 'area' for a light sample."""
         if self.facing is not None:
             return "area"
         return "spot" if self.cone is not None else "point" if self.w else "directional"
@@ -95,7 +95,7 @@ class Light:
 
     @property
     def normal(self) -> Any:
-        """The normal of a light point, a unit vector; None for other lights."""
+        """The normal of a light sample, a unit vector; None for other lights."""
         return None if self.facing is None else type(self.position)(self.facing.exact_normal)
 
     @property
@@ -138,7 +138,7 @@ class Light:
     def rays_from(self, unit) -> tuple[Any, Any]:
         """Return where rays from a light that has a place start, and how far from it that is along them [m].
 
-        Those of a light point start beyond the shape that it lies on, so that they do not meet it.
+        Those of a light sample start beyond the shape that it lies on, so that they do not meet it.
 
         `unit`: unit directions, in any precision.
         """
@@ -154,7 +154,7 @@ class Light:
 
 
 def sources_of(lights: tuple[Light, ...]) -> list[list[int]]:
-    """Return the numbers of the lights of each source: those of a light with extent together, others alone."""
+    """Return the numbers of the lights of each source: those of an area light together, others alone."""
     by_source: dict[Any, list[int]] = {}
     for number, light in enumerate(lights):
         key = ("alone", number) if light.source is None else light.source

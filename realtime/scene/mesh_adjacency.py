@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow casters: the triangles of a scene and how they hang together.
+"""Occluders: the triangles of a scene and how they hang together.
 
 Adjacency is computed once; when a light moves only signs change (`realtime.methods.shadow_planes.silhouettes`), when
 an object moves only its vertices (`with_positions`).
 
 Vertices that coincide exactly are one vertex: meshes come with seams where texture coordinates differ. An edge is met
 by *half-edges*, one for each triangle at it, each with a direction. Half-edges of an edge are paired, opposite ones
-first, and each pair is one entry of `Casters.edges`; one that finds no partner is an entry whose second triangle is
-`Casters.none`. So a manifold edge is one entry, a border edge one with a single triangle, and an edge at which four
+first, and each pair is one entry of `Occluders.edges`; one that finds no partner is an entry whose second triangle is
+`Occluders.none`. So a manifold edge is one entry, a border edge one with a single triangle, and an edge at which four
 triangles meet two entries: their sum is the same whichever way they are paired.
 """
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from realtime.area_lights.shape import AreaLight, caster_triangles, caster_vertices
+from realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices
 from realtime.errors import InputError
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ Index = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
-class Casters:
+class Occluders:
     """Triangles that cast shadows, with their adjacency."""
 
     vertices: Array  #: positions [m], (vertices, 3)
@@ -58,7 +58,7 @@ class Casters:
         return np.isin(self.owner, [number for number, (own, _, _) in enumerate(self.shapes) if own == name])
 
 
-def read_casters(scene, area_lights: Sequence[AreaLight] = ()) -> Casters:
+def read_occluders(scene, area_lights: Sequence[AreaLight] = ()) -> Occluders:
     """Read the triangles of a Mitsuba scene.
 
     `scene`: an `mi.Scene`; shapes whose surface lets light pass (`null`) cast no shadow; `area_lights`: its lights with
@@ -70,16 +70,16 @@ def read_casters(scene, area_lights: Sequence[AreaLight] = ()) -> Casters:
     for shape in scene.shapes():
         if shape.is_emitter() and shape.id() in known:
             light = known[shape.id()]
-            meshes.append((light.name, caster_vertices(light), caster_triangles(light)))
+            meshes.append((light.name, occluder_vertices(light), occluder_triangles(light)))
             continue
         if shape.bsdf() is not None and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
             continue
         meshes.append((shape.id(), *_triangles(shape)))
-    return make_casters(meshes)
+    return make_occluders(meshes)
 
 
-def make_casters(meshes) -> Casters:
-    """Return the casters of meshes.
+def make_occluders(meshes) -> Occluders:
+    """Return the occluders of meshes.
 
     `meshes`: (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are
     left out, the latter with a warning.
@@ -103,7 +103,7 @@ def make_casters(meshes) -> Casters:
     for key in ("triangles", "edges", "left", "right", "component"):
         joined[key] = np.ascontiguousarray(joined[key], dtype=np.int32)
     owner = np.repeat(np.arange(len(parts)), [len(part["closed"]) for part in parts])
-    return Casters(
+    return Occluders(
         **joined,
         shapes=tuple(shapes),
         owner=owner,
@@ -111,17 +111,17 @@ def make_casters(meshes) -> Casters:
     )
 
 
-def with_positions(casters: Casters, positions: Mapping[str, Array]) -> Casters:
-    """Return the casters with the vertices of some shapes elsewhere; `positions` are those of the shapes [m]."""
+def with_positions(occluders: Occluders, positions: Mapping[str, Array]) -> Occluders:
+    """Return the occluders with the vertices of some shapes elsewhere; `positions` are those of the shapes [m]."""
     if not positions:
-        return casters
-    vertices = casters.vertices.copy()
-    for name, first, own in casters.shapes:
+        return occluders
+    vertices = occluders.vertices.copy()
+    for name, first, own in occluders.shapes:
         if name in positions:
             vertices[first : first + len(own)] = positions[name][own]
-    normals, offsets = _planes(vertices, casters.triangles)
-    boxes = _boxes(vertices, casters.triangles, casters.component, len(casters.closed))
-    return replace(casters, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
+    normals, offsets = _planes(vertices, occluders.triangles)
+    boxes = _boxes(vertices, occluders.triangles, occluders.component, len(occluders.closed))
+    return replace(occluders, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
 
 
 def mesh_triangles(mesh) -> tuple[Array, NDArray[np.int64]]:

@@ -3,7 +3,7 @@
 
 A shape with the material `null` and an interior medium is the boundary of a medium: light passes, nothing is seen of
 it. All of them lie in one medium, the camera's own or, for a camera inside one of them, its exterior; none is a vacuum.
-In clear air a boundary may be any closed mesh, a cloud, and its medium may have a density from place to place.
+In vacuum a boundary may be any closed mesh, a cloud, and its medium may have a density from place to place.
 """
 
 from collections.abc import Sequence
@@ -95,7 +95,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
     """Return the medium of a scene with the bounded media in it.
 
     `sensor`: Mitsuba's sensor; `boundaries`: the shapes that bound media; `types`: array types to compute with. Returns
-    `medium`: in clear air with `clouds`, whatever the bounds; with `bounded_media` only where all bounds are convex;
+    `medium`: in vacuum with `clouds`, whatever the bounds; with `bounded_media` only where all bounds are convex;
     `meshes`: the bounds where not all of them are convex, or a medium is not homogeneous; then all are meshes. Raises
     InputError for media that no method can render, with the name of what is in the way.
     """
@@ -126,7 +126,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
     if around is not None and not all_convex:
         raise InputError(
             f"shape '{_first_cloud(shapes, uneven)}' bounds a medium within another one and is not convex, or that "
-            "medium is not homogeneous; wanted clear air around it: remove the exterior medium, and the camera's"
+            "medium is not homogeneous; wanted vacuum around it: remove the exterior medium, and the camera's"
         )
     grids = [
         read_cloud_density(shape.interior_medium(), meshes[number])

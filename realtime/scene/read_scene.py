@@ -52,7 +52,7 @@ class SceneFeatures:
     spot_lights: int
     soft_spots: bool  #: a spot's intensity falls off inside its cone
     directional_lights: int = 0
-    area_lights: tuple[str, ...] = ()  #: the shapes of lights with extent: 'rectangle', 'disk', 'sphere' or 'mesh'
+    area_lights: tuple[str, ...] = ()  #: the shapes of area lights: 'rectangle', 'disk', 'sphere' or 'mesh'
     clear: bool = False  #: bounded: nothing fills the space between the media
     concave: tuple[str, ...] = ()  #: shapes that bound media and are not all convex: clouds
     uneven: int = 0  #: clouds whose density differs from place to place
@@ -78,7 +78,7 @@ class Scene:
     boundaries: tuple[Any, ...] = ()  #: Mitsuba's shapes around bounded media, in the order of `Medium.clouds`
 
     def source_shape(self, light: Light) -> str | None:
-        """Return the name of the shape of a light point that casts no shadow in it; None otherwise."""
+        """Return the name of the shape of a light sample that casts no shadow in it; None otherwise."""
         area = None if light.source is None else self.area_lights[light.source]
         return None if area is None or area.folded else area.name
 
@@ -214,7 +214,7 @@ def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
     elif not (isinstance(medium, GridMedium) or (medium.clear and medium.clouds)):
         raise InputError(
             "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
-            "infinity: wanted media with bounds in clear air; give the medium bounds, or use a 'point' or 'spot' light"
+            "infinity: wanted media with bounds in vacuum; give the medium bounds, or use a 'point' or 'spot' light"
         )
     parameters = mi.traverse(emitter)
     if "irradiance.value" not in parameters:
@@ -384,10 +384,10 @@ def describe(features: SceneFeatures) -> dict[str, str]:
         "phase function": "isotropic: left out of the integrand"
         if features.isotropic
         else "anisotropic: split at the foot point",
-        "medium": f"{len(features.concave)} clouds in clear air, bounded by meshes: rays cast at them"
+        "medium": f"{len(features.concave)} clouds in vacuum, bounded by meshes: rays cast at them"
         + f", {features.uneven} with a grid of densities: marched" * bool(features.uneven)
         if features.concave
-        else f"bounded, in {'clear air' if features.clear else 'another medium'}: rays clipped, no kernel"
+        else f"bounded, in {'vacuum' if features.clear else 'another medium'}: rays clipped, no kernel"
         if features.bounded
         else "height fog: depths and suns in closed form, panels of nodes for lights at places"
         if features.height_fog

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow maps over hemispheres, of all points of a light with extent, in one array.
+"""Shadow maps over hemispheres, of all points of an area light, in one array.
 
-A light point shines into the half space before its normal. A cube map would spend three of its six faces on nothing; an
-octahedral map (Praun and Hoppe 2003; Cigolle et al. 2014) covers the half space with one square. With the local
+A light sample shines into the half space before its normal. A cube map would spend three of its six faces on nothing;
+an octahedral map (Praun and Hoppe 2003; Cigolle et al. 2014) covers the half space with one square. With the local
 coordinates (a, b, c) of a direction, c along the normal, and s = |a| + |b| + c,
 
     u = (a + b) / s,     v = (a - b) / s,     both from -1 to 1.
@@ -25,25 +25,25 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.numerics.array_types import bytes_of
-from realtime.scene.light_points import LightFrame
+from realtime.scene.light_samples import LightFrame
 from realtime.shadow_maps.shadow_map import check_size, tiled_corners
 
 
 @dataclass(frozen=True)
 class HemisphereMaps:
-    """What the rays of N light points meet first, map by map, row by row."""
+    """What the rays of N light samples meet first, map by map, row by row."""
 
     size: int  #: texels on a side
     inverse: Any  #: N (size + 1)^2 values 1/s, 0 where there is nothing [1/m]
     eased: Any  #: the same, less what a plane changes in half a texel [1/m]; None where no surface is asked for
 
     def lit(self, number: Any, place: tuple[Any, Any, Any], active: Any = True) -> Any:
-        """Return whether a light point reaches points in the air, given by local coordinates [m]."""
+        """Return whether a light sample reaches points in the air, given by local coordinates [m]."""
         own, corner = self._corner(number, place)
         return own >= dr.gather(type(own), self.inverse, corner, active)
 
     def lit_surface(self, number: Any, place: tuple[Any, Any, Any]) -> Any:
-        """Return whether a light point reaches points on surfaces, given by local coordinates [m]."""
+        """Return whether a light sample reaches points on surfaces, given by local coordinates [m]."""
         assert self.eased is not None
         own, corner = self._corner(number, place)
         return own >= dr.gather(type(own), self.eased, corner)
@@ -75,7 +75,7 @@ def cast_hemisphere_maps(
 ) -> HemisphereMaps:
     """Cast the maps of all points of a light.
 
-    `scene`: the Mitsuba scene that holds the occluders; `frames`: the light points, one a lane; `points`: how many
+    `scene`: the Mitsuba scene that holds the occluders; `frames`: the light samples, one a lane; `points`: how many
     there are; `size`: texels on a side of each map, a power of two; `for_surfaces`: whether points on surfaces will be
     asked for, not only those in the air. Raises InputError if `size` is not a power of two from 4 to 8192.
     """

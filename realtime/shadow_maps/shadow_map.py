@@ -116,7 +116,7 @@ def tiled_corners(faces: int, side: int):
 def texel_rays(light: Light, size: int) -> tuple[Any, Any, Any]:
     """Return the rays of a directional light through the middles of the texels of its map, in squares of 4 x 4.
 
-    `light`: a directional light with an extent; `size`: texels on a side, a multiple of 4. Returns where the rays start
+    `light`: a directional area light; `size`: texels on a side, a multiple of 4. Returns where the rays start
     [m] and their unit direction, in float64, and the numbers of their texels, row by row.
     """
     _, row, column = tiled_corners(1, size)

@@ -17,7 +17,7 @@ Read in this order:
 - `replicates.py`: how many samples a ray needs, and means whose intervals hold;
 - `mesh_choice.py`: which triangles of a mesh of light samples lie on;
 - `light_samples.py`: samples of area lights for a ray or a surface point;
-- `light_points.py`: even points on them, for sums that all rays share;
+- `shared_samples.py`: even points on them, for sums that all rays share;
 - `area_lights.py`: the airlight of area lights, and the surfaces that they light;
 - `sky.py`: the light of a uniform sky;
 - `emission.py`: these lights seen directly;

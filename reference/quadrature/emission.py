@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent, and the background, as the camera sees them: their own radiance through the medium, a layer."""
+"""Area lights, and the background, as the camera sees them: their own radiance through the medium, a layer."""
 
 from collections.abc import Iterator
 
@@ -22,7 +22,7 @@ _FAR = 1e30  # beyond all bounds of media [m]
 
 
 def emitted_light(reference: ReferenceScene, distance: Array) -> Array:
-    """Return the radiance of lights with extent before the visible surface, and of the background where there is none.
+    """Return the radiance of area lights before the visible surface, and of the background where there is none.
 
     In W/(m^2 sr), (rays, 3).
 

@@ -102,7 +102,7 @@ def _of_suns(medium: HeightMedium, rays: Rays, stretches: Stretches, edge: Array
     for x in (x0, x1):
         at = np.where(np.isfinite(x), x, 0.0)
         z = origin + rise * at
-        depth = fog.optical_depth(origin, z, at) + fog.endless(z, mu)
+        depth = fog.optical_depth(origin, z, at) + fog.unbounded(z, mu)
         with np.errstate(over="ignore"):
             f = np.exp(fog.log_density(z) - depth) * phase
         error += edge[ray] * np.where(np.isfinite(x), f, 0.0)

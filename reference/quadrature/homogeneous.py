@@ -9,7 +9,7 @@ The single scattering of a piece of a ray inside one medium m is, for a light at
     tau_shadow = sigma_0 s r + sum_j (sigma_j - sigma_0) |[enter_j, leave_j] and [0, s r]|,
 
 I its intensity or irradiance, r the distance to it, enter_j and leave_j the distances from the point x at which the
-shadow segment enters and leaves body j; s is `shadow_scale`. Under a directional light sigma_0 = 0 and r is endless.
+shadow segment enters and leaves body j; s is `shadow_scale`. Under a directional light sigma_0 = 0 and r is unbounded.
 Near a place the integral is taken in v = asinh((x - foot)/height), dx/r^2 = dv/(height cosh v), where it is as smooth
 beside the light as far from it; else in x.
 
@@ -194,14 +194,14 @@ class _Body:
         r = r if own.w else np.full(len(r), np.inf)
         missed = (low >= high) | (low >= r) | (high <= 0)
         facets = []
-        for facet, at_zero, endless in ((enter, missed | (low <= 0), False), (leave, missed, high >= r)):
-            given = at_zero | endless
+        for facet, at_zero, unbounded in ((enter, missed | (low <= 0), False), (leave, missed, high >= r)):
+            given = at_zero | unbounded
             room = bounds.offset[facet] - bounds.normal[facet] @ own.origin
             slope = np.sum(bounds.normal[facet] * lines.direction, axis=1)
             rise = np.sum(bounds.normal[facet] * (lines.position - own.w * own.origin), axis=1)
             facets.append(
                 (
-                    np.where(at_zero, 0.0, np.where(endless, np.inf, room)),
+                    np.where(at_zero, 0.0, np.where(unbounded, np.inf, room)),
                     np.where(given, 0.0, slope),
                     np.where(given, 1.0, rise),
                 )

@@ -7,8 +7,8 @@ with phi the azimuth of such a half plane and l the arc length along the curve i
 
     dA = h dphi dl / n_in,        n_in the length of the part of the normal within the half plane,
 
-and h J(y) is bounded however close the ray passes: an endless ray in a clear medium receives (1 + cos) n_in from y, cos
-that of the angle in the half plane between normal and ray. So samples are drawn by phi and l. These are polar
+and h J(y) is bounded however close the ray passes: an unbounded ray in a clear medium receives (1 + cos) n_in from y,
+cos that of the angle in the half plane between normal and ray. So samples are drawn by phi and l. These are polar
 coordinates about the ray, the same for all of its points, and lit intervals stay those of one point of the light.
 
 A half plane cuts a rectangle, a triangle and a disk in a segment, a sphere of radius R in a circle of radius rho. There

@@ -84,7 +84,7 @@ def _parts(reference: ReferenceScene, rays: Rays, segments: Segments, ray: Index
         parts.append((rows, medium[rows], low, high, low == x0[keep], (high == x1[keep]) & np.isfinite(high)))
     ray, number, low, high, first, last = (np.concatenate(column) for column in zip(*parts))
     if np.any(np.isinf(high)):
-        # Only what surrounds the bodies is endless, and only if its extinction is not zero does it scatter.
+        # Only what surrounds the bodies is unbounded, and only if its extinction is not zero does it scatter.
         sigma_t = reference.medium.sigma_t
         reach = np.maximum(low, rays.foot[ray]) + _UNDERFLOW / sigma_t[sigma_t > 0].min()
         high = np.where(np.isinf(high), reach, high)

@@ -38,7 +38,7 @@ from reference.visibility.exact_distance import exact_distance
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
-_STEPS = 1000  # of progress through the points of lights with extent, and through their lines
+_STEPS = 1000  # of progress through the points of area lights, and through their lines
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class ReferenceImage:
     disagreements: int = 0  #: of these, how many contradicted them
     refined: int = 0  #: contradictions that were settled, by mending the intervals or by a float64 test
     left: int = 0  #: contradictions that were not: their worth is in the bound
-    emitted: Array | None = None  #: lights with extent, or the background, seen directly [W/(m^2 sr)]; None without any
+    emitted: Array | None = None  #: area lights, or the background, seen directly [W/(m^2 sr)]; None without any
     airlight_se: Array | None = None  #: standard error of the airlight of such lights, or of a sky [W/(m^2 sr)]
     surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
     #: means over the image of what area lights add to airlight and surface, by replicate of their points, which all
@@ -76,7 +76,7 @@ class RayValues:
     intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
     transitions: int  #: edges between light and shadow
     random_checks: RandomChecks  #: of the lit intervals
-    #: lights with extent or a sky, seen directly, (rays, 3), and for each replicate of their samples airlight and
+    #: area lights or a sky, seen directly, (rays, 3), and for each replicate of their samples airlight and
     #: surface, (rays, 6, replicates) [W/(m^2 sr)]; in other scenes without columns
     emitted: Array = field(default_factory=lambda: np.empty((0, 0)))
     replicates: Array = field(default_factory=lambda: np.empty((0, 0, 0)))

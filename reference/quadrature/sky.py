@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from reference.quadrature.fields import optical_depth
 from reference.quadrature.light_airlight import directional_airlight
 from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
-from reference.quadrature.surface import ENDLESS, Reflection, SurfaceHits
+from reference.quadrature.surface import UNBOUNDED, Reflection, SurfaceHits
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceScene
 from reference.scene.shapes import Shapes
@@ -80,7 +80,7 @@ def sky_light(
             lit = received.reached[visible]
             row, towards = visible[lit], np.broadcast_to(-direction, (int(lit.sum()), 3))
             if len(row):
-                through = optical_depth(reference, point[lit], towards, start[lit], np.full(len(row), ENDLESS))
+                through = optical_depth(reference, point[lit], towards, start[lit], np.full(len(row), UNBOUNDED))
                 radiance = reflection(row, towards) * np.exp(-through) * left[lit] * sun.irradiance
                 replicates[row, 3:, replicate] += radiance
             tell((replicate + (number + 1) / most) / REPLICATES)

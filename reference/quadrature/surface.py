@@ -5,7 +5,7 @@
 
 with f cos by `BSDF.eval` and I / r^2 by `Emitter.sample_direction`; s scales the shadow segment (see
 `reference.quadrature.ray_values`). Through bounded media the optical depth is that of both ways piece by piece. A
-directional light has its irradiance in the place of I / r^2, and an endless shadow segment: only bodies dim it.
+directional light has its irradiance in the place of I / r^2, and an unbounded shadow segment: only bodies dim it.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from reference.scene.read import ReferenceLight, ReferenceScene
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-ENDLESS = float(np.finfo(float).max)  #: how far the shadow segment of a directional light goes [m]
+UNBOUNDED = float(np.finfo(float).max)  #: how far the shadow segment of a directional light goes [m]
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def lit_surface(
         reflected = interaction.bsdf().eval(mi.BSDFContext(), interaction, interaction.to_local(towards.d), facing)
         radiance = as_rows(reflected * arriving)
         if isinstance(light, DirectionalLight):
-            way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), ENDLESS)
+            way, r = np.broadcast_to(-light.direction, point.shape), np.full(len(point), UNBOUNDED)
         else:
             way = light.position - point
             r = np.linalg.norm(way, axis=1)

@@ -9,7 +9,7 @@ Read in this order:
 - `camera.py`: directions of rays through positions on the film;
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
-- `area_light.py`: lights with extent, read and checked;
+- `area_light.py`: area lights, read and checked;
 - `varying.py`: what media have whose extinction differs from place to place;
 - `height_fog.py`: media whose density depends on height;
 - `density_grid.py`: media whose density is a grid;

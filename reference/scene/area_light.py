@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent: Mitsuba's `area` emitters of constant radiance on rectangles, disks, spheres and meshes.
+"""Area lights: Mitsuba's `area` emitters of constant radiance on rectangles, disks, spheres and meshes.
 
 A rectangle, a disk and a triangle emit from the side of their normal, a sphere outwards. Normals at vertices, which
 only smooth the look of a mesh, say which side of its triangles that is, and nothing more. The material is opaque (the

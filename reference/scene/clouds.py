@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reading a scene of clouds for the reference: media of any order of scattering in closed meshes of any shape.
 
-Clouds lie in clear air, apart from one another. Suns are directional emitters, the sky is at most one emitter of
+Clouds lie in vacuum, apart from one another. Suns are directional emitters, the sky is at most one emitter of
 constant radiance. Other lights are refused by name.
 """
 
@@ -18,7 +18,7 @@ from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.cloud_density import CloudDensity, read_cloud_density
 from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
 from reference.scene.read import (
-    CLEAR_AIR,
+    VACUUM,
     ReferenceMedium,
     read_medium,
     read_scattering,
@@ -56,12 +56,12 @@ class CloudScene:
     clouds: tuple[Cloud, ...]
     suns: tuple[DirectionalLight, ...]
     sky: Array  #: radiance of the sky, RGB, zero without one [W/(m^2 sr)]
-    camera_cloud: int  #: number of the cloud that the camera is in, -1 in clear air
+    camera_cloud: int  #: number of the cloud that the camera is in, -1 in vacuum
 
     @property
     def around(self) -> ReferenceMedium:
-        """What surrounds the clouds: clear air."""
-        return CLEAR_AIR
+        """What surrounds the clouds: vacuum."""
+        return VACUUM
 
 
 def read_clouds(scene) -> CloudScene:
@@ -86,7 +86,7 @@ def read_clouds(scene) -> CloudScene:
             )
     for shape in boundaries:
         if shape.exterior_medium() is not None:
-            raise InputError(f"the exterior medium of shape '{shape.id()}' is not clear air; wanted none around clouds")
+            raise InputError(f"the exterior medium of shape '{shape.id()}' is not vacuum; wanted none around clouds")
     clouds = tuple(_read_cloud(shape) for shape in boundaries)
     width, height = (int(n) for n in sensor.film().size())
     origin = camera_matrix(sensor)[:3, 3]

@@ -26,7 +26,7 @@ def is_directional(emitter) -> bool:
     return bool(emitter.class_name() == "DirectionalEmitter")
 
 
-def endless_medium(emitter) -> str:
+def unbounded_medium(emitter) -> str:
     """Return why a directional light is refused in a medium without bounds."""
     return (
         f"light '{emitter.id()}' is directional: nothing of it arrives through a medium without bounds; give the "

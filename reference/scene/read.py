@@ -22,10 +22,10 @@ from reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
 from reference.scene.density_grid import GridMedium, is_grid, read_grid
 from reference.scene.directional_light import (
     DirectionalLight,
-    endless_medium,
     is_directional,
     read_directional,
     sun_below,
+    unbounded_medium,
 )
 from reference.scene.height_fog import HeightMedium, is_height_fog, read_height_fog
 from reference.scene.varying import NO_EXTINCTION, VaryingMedium
@@ -38,11 +38,11 @@ _AROUND = ("ConstantBackgroundEmitter", "EnvironmentMapEmitter")
 
 @dataclass(frozen=True)
 class ReferenceLight:
-    """A point or spot light, or a point of a light with extent."""
+    """A point or spot light, or a point of an area light."""
 
     position: Array  #: [m]
     intensity: Array  #: radiant intensity on the axis [W/sr], RGB
-    axis: Array | None = None  #: spot: unit vector; of a point of a light with extent the normal
+    axis: Array | None = None  #: spot: unit vector; of a point of an area light the normal
     cutoff: float = np.pi  #: spot: half angle of the cone [rad]
     beam: float = np.pi  #: spot: half angle of full intensity [rad]
     cosine: bool = False  #: whether the intensity falls off as the cosine of the angle to the axis
@@ -68,7 +68,7 @@ class ReferenceMedium:
         return self.sigma_t
 
 
-CLEAR_AIR = ReferenceMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
+VACUUM = ReferenceMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class ReferenceScene:
     lights: tuple[ReferenceLight, ...]  #: point and spot lights
     media: tuple[BoundedMedium, ...] = ()  #: the media with bounds, disjoint
     directional: tuple[DirectionalLight, ...] = ()  #: directional lights; all media then have bounds, or a cap
-    area: tuple[ReferenceAreaLight, ...] = ()  #: lights with extent
+    area: tuple[ReferenceAreaLight, ...] = ()  #: area lights
     background: Any = None  #: Mitsuba's emitter around the scene, seen behind it; not in `scene`
     #: radiance of a uniform background, RGB [W/(m^2 sr)], which lights media and surfaces; None where none arrives:
     #: through an unbounded homogeneous medium
@@ -133,7 +133,7 @@ def read_reference(scene) -> ReferenceScene:
     suns = tuple(read_directional(emitter) for emitter in far)
     for emitter, sun in zip(far, suns, strict=True):
         if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
-            raise InputError(endless_medium(emitter))
+            raise InputError(unbounded_medium(emitter))
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(sun_below(emitter))
     sky = _sky(background, medium)
@@ -284,11 +284,11 @@ def _read_ambient(
         return read_medium(ambient, "the medium")
     if not media:
         raise InputError("the camera references no medium: it would be in a vacuum; reference the medium in the sensor")
-    return CLEAR_AIR
+    return VACUUM
 
 
 def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium | None:
-    """Return a density grid in clear air whose only boundary holds its whole box, which then bounds nothing."""
+    """Return a density grid in vacuum whose only boundary holds its whole box, which then bounds nothing."""
     shape = boundaries[0] if len(boundaries) == 1 else None
     if shape is None or shape.exterior_medium() is not None or not is_grid(shape.interior_medium()):
         return None
@@ -324,7 +324,7 @@ def read_medium(medium, name: str) -> ReferenceMedium:
     if not medium.is_homogeneous():
         raise InputError(
             f"{name} is heterogeneous; wanted a medium of type 'homogeneous', or a density grid in the sensor, or one "
-            "in clear air in a convex shape that holds its whole box"
+            "in vacuum in a convex shape that holds its whole box"
         )
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)

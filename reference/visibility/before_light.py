@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can stand in the light of a light with extent.
+"""What can stand in the light of an area light.
 
 A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides itself: so a light's own
 shape never shadows it, nor does what lies in or behind the plane of a rectangle or a disk. It is left out, for in
@@ -21,7 +21,7 @@ IN_PLANE = 1e-7  #: of the largest coordinate: what is closer to the plane of a 
 def before_light(reference: ReferenceScene, light: ReferenceAreaLight) -> tuple[ReferenceScene, Shapes]:
     """Return the scene and the shapes that can shadow a light.
 
-    `reference`, `light`: the scene and one of its lights with extent.
+    `reference`, `light`: the scene and one of its area lights.
     """
     shapes = reference.occluders.shapes()
     others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]

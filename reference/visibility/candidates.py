@@ -7,15 +7,15 @@ out. For a unit vector m the hull reaches up to
 
     h(m) = max(0, m . (C - o) + R, max_i l_i m . d_i),
 
-o the camera, C and R the ball (a direction C towards the light: endless if m . C > 0), d_i and l_i the rays and their
+o the camera, C and R the ball (a direction C towards the light: unbounded if m . C > 0), d_i and l_i the rays and their
 lengths; a shape is out if the ball around it is above h(m) along m. That holds whatever m is, so no case needs care.
 
 Rays are taken in tiles: sorted by their azimuth about the axis from the camera to the light, cut in strips, and these
 by the angle from the axis. All planes of rays and a point light hold this axis, so the planes on both sides of a strip
 leave out all but the shapes that the planes of its rays meet. Other m lie in the plane of the tile's mean ray and the
-axis, and touch the ball beside it. Where rays are endless, m is leaned back until none of them rises along it. Rays
+axis, and touch the ball beside it. Where rays are unbounded, m is leaned back until none of them rises along it. Rays
 are parted again and again, and each part looks through what the one that it is of has left, while that is much; for a
-light with extent, whose samples are many, down to single rays.
+area light, whose samples are many, down to single rays.
 """
 
 from collections.abc import Iterator

@@ -18,9 +18,9 @@ light to the centre, or along the light,
     n = -s e +- sqrt(1 - s^2) e',      s = w rho / |w C - P|,      e' across e,
 
 and the shadow ends at the images of both, unless one is touched at w y >= y_P: the disk then reaches beyond the line
-through the light along the ray, and the shadow is endless on that side; or at y < 0: then it ends where the ray itself
-meets the disk, at c_z +- sqrt(rho^2 - c_y^2). A light inside of a sphere sees what is inside and nothing else, and the
-range in which a ray is looked at is cut to that before (`reference.visibility.lit_intervals`).
+through the light along the ray, and the shadow is unbounded on that side; or at y < 0: then it ends where the ray
+itself meets the disk, at c_z +- sqrt(rho^2 - c_y^2). A light inside of a sphere sees what is inside and nothing else,
+and the range in which a ray is looked at is cut to that before (`reference.visibility.lit_intervals`).
 
 **What is left.** Neighbours in a mesh mostly follow one another in its list: a shadow that touches the one before it
 becomes part of it as it is found. Then t begins at the beginning of a ray: shadows that begin before t and end after it

@@ -390,9 +390,9 @@ def _plan(asked: _Asked) -> "Plan":
     """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import ShadowPlanes
-    from realtime.methods.shadow_planes.plane_counts import caster_plan, describe_casters
+    from realtime.methods.shadow_planes.plane_counts import describe_occluders, occluder_plan
     from realtime.parameters import values
-    from realtime.scene.light_points import with_light_points
+    from realtime.scene.light_samples import with_light_samples
     from realtime.scene.read_scene import describe
     from reports.api.results import Plan
     from validation.study.configuration import prepared
@@ -402,13 +402,13 @@ def _plan(asked: _Asked) -> "Plan":
     method, seen = find_method(asked.chosen.method), read
     if read.area_lights:
         own: dict[str, Any] = {
-            name: value for name, value in asked.chosen.parameters if name in values(method.light_points)
+            name: value for name, value in asked.chosen.parameters if name in values(method.light_samples)
         }
-        points = replace(method.light_points, **own)
-        words["light points"] = f"{points.points} of each area light, {points.pattern}"
-        seen = with_light_points(read, 1, "ring")  # the casters as the middle of each sees them
+        points = replace(method.light_samples, **own)
+        words["light samples"] = f"{points.points} of each area light, {points.pattern}"
+        seen = with_light_samples(read, 1, "ring")  # the occluders as the middle of each sees them
     if issubclass(method, ShadowPlanes):
-        words |= describe_casters(caster_plan(seen))
+        words |= describe_occluders(occluder_plan(seen))
         _warnings(prepared(read, asked.chosen))
     return Plan(words, notes)
 

@@ -85,7 +85,7 @@ def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
 def _light(light: dict[str, Any]) -> dict[str, Any]:
     """Return a light; its power is that of a lamp that shines as on its axis in all directions."""
     if light["kind"] == "area":
-        return {"cannot": "lights with extent were not tried in Cycles"}
+        return {"cannot": "area lights were not tried in Cycles"}
     if light["kind"] == "spot" and light["beam_angle"] < light["cutoff_angle"]:
         return {"cannot": "the edge of Blender's spots is another function of the angle"}
     directional = light["kind"] == "directional"

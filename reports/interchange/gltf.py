@@ -12,7 +12,7 @@ scene really has is in the `extras` of each light, camera, material and medium.
 The file is written here, not by trimesh, which writes the ratio of the angles of view as the aspect ratio of a camera,
 3 % off at 52 degrees, and no lights.
 
-glTF has no light with extent, and KHR_lights_punctual none either. Such a light is written as its shape, a mesh whose
+glTF has no area light, and KHR_lights_punctual none either. Such a light is written as its shape, a mesh whose
 material emits (KHR_materials_emissive_strength, whose unit is cd/m^2: here the largest channel of the radiance in
 W/(m^2 sr), again with no factor of 683 lm/W). Engines that do not treat emitting meshes as lights show it and are not
 lit by it; the `extras` say so, and have the shape in numbers.
@@ -221,7 +221,7 @@ def _material(surface: dict[str, Any]) -> dict[str, Any]:
 
 
 def _emission(light: dict[str, Any]) -> dict[str, Any]:
-    """Return the material of a light with extent: black, and as bright as the light on the side of its normal."""
+    """Return the material of an area light: black, and as bright as the light on the side of its normal."""
     largest = max(light["radiance"])
     factor = [value / largest for value in light["radiance"]] if largest > 0 else [0.0, 0.0, 0.0]
     return {
@@ -239,7 +239,7 @@ def _emission(light: dict[str, Any]) -> dict[str, Any]:
         },
         "extras": {
             "light": light,
-            "note": "core glTF has no light with extent: this mesh emits; to some engines no mesh is a light",
+            "note": "core glTF has no area light: this mesh emits; to some engines no mesh is a light",
             "unit": "emissiveStrength is in W/(m^2 sr): no factor of 683 lm/W is in it",
         },
     }

@@ -250,7 +250,7 @@ def _directional(light: DirectionalLight) -> dict[str, Any]:
 
 
 def _area(light: ReferenceAreaLight) -> dict[str, Any]:
-    r"""Return a light with extent: a Lambertian emitter of area A sends pi Le A, from a sphere of 4 pi r^2 too."""
+    r"""Return an area light: a Lambertian emitter of area A sends pi Le A, from a sphere of 4 pi r^2 too."""
     radiance = np.array(_numbers(light.radiance))
     power = np.pi * light.area * radiance
     described: dict[str, Any] = {

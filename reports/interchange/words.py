@@ -38,7 +38,7 @@ def description_table(described: Mapping[str, Any]) -> Table:
 def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
     yield "axes", "", f"right-handed, {described['up']} up"
     yield from _block("camera", described["camera"])
-    yield from _block("medium", described["medium"] or {"everywhere": "clear air"})
+    yield from _block("medium", described["medium"] or {"everywhere": "vacuum"})
     for medium in described["bounded_media"]:
         yield from _block("bounded medium", medium)
     for light in described["lights"]:

@@ -32,7 +32,7 @@ class KnownReference:
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     surface: Array  #: [W/(m^2 sr)]
-    bound: Array  #: of the error of the airlight; with lights with extent, and twice its standard error [W/(m^2 sr)]
+    bound: Array  #: of the error of the airlight; with area lights, and twice its standard error [W/(m^2 sr)]
 
     @staticmethod
     def of_size(width: int, height: int) -> "KnownReference":

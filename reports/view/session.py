@@ -396,9 +396,9 @@ class Session:
 def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration:
     """Return a configuration that names only what differs from the method's defaults."""
     record = find_method(method)
-    own, light_points = method_parameters(record, given)
-    now = values(light_points) | values(own)
-    usual = values(record.light_points) | defaults(record)
+    own, light_samples = method_parameters(record, given)
+    now = values(light_samples) | values(own)
+    usual = values(record.light_samples) | defaults(record)
     differing = {name: now[name] for name in given if now[name] != usual[name]}
     return configuration(method, str(kernel) if kernel and own.uses_kernel else None, differing)
 

@@ -4,7 +4,7 @@
 from dataclasses import Field, fields
 from typing import Any
 
-from realtime.area_lights.points import LightPoints
+from realtime.area_lights.points import LightSamples
 from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import METHODS, find_method
@@ -30,12 +30,12 @@ def kernel_widgets() -> list[dict[str, Any]]:
 def parameter_widgets(chosen: Configuration, *, area_lights: bool) -> list[dict[str, Any]]:
     """Return the parameters of a method with values, ranges and help; for area lights also of their points."""
     method = find_method(chosen.method)
-    own, light_points = method_parameters(method, dict(chosen.parameters))
+    own, light_samples = method_parameters(method, dict(chosen.parameters))
     widgets = [_parameter(item, getattr(own, item.name)) for item in fields(own)]
     if area_lights:
         names = {widget["name"] for widget in widgets}
-        common = [item for item in fields(LightPoints) if item.name not in names]
-        widgets += [_parameter(item, getattr(light_points, item.name)) for item in common]
+        common = [item for item in fields(LightSamples) if item.name not in names]
+        widgets += [_parameter(item, getattr(light_samples, item.name)) for item in common]
     return widgets
 
 

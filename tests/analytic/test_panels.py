@@ -150,8 +150,8 @@ def test_corners():
     expected, _ = quad(lambda x: np.exp(-0.3 * (2 * x - 5)) / (x - 5) ** 2, 6, np.inf, epsabs=0, epsrel=1e-11)
     assert behind[0] == pytest.approx(float(PhaseFunction("hazy")(-1.0)) * expected, rel=1e-10)
     # a ray without end in a vacuum sees half the sphere of angles behind the foot, all of it from far enough before
-    endless, _ = airlight_segments(np.array([0.0, 1e9]), 1.0, 0.0, np.inf, 0.0, ISOTROPIC)
-    np.testing.assert_allclose(endless, [np.pi / 2, np.pi - 1e-9], rtol=1e-12)
+    unbounded, _ = airlight_segments(np.array([0.0, 1e9]), 1.0, 0.0, np.inf, 0.0, ISOTROPIC)
+    np.testing.assert_allclose(unbounded, [np.pi / 2, np.pi - 1e-9], rtol=1e-12)
     # so thick that nothing is left: no NaN, no warning
     dark, error = airlight_segments(1e4, 1.0, 0.0, np.inf, 50.0, PhaseFunction("hg", g=-0.99))
     assert dark.tolist() == [0.0]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Closed forms for lights with extent: what scenes with a known answer are held against.
+r"""Closed forms for area lights: what scenes with a known answer are held against.
 
-**A sphere beside a ray, in endless fog of isotropic scattering.** A point at the distance d from the centre of a sphere
-of radius R and radiance Le receives the fluence
+**A sphere beside a ray, in unbounded fog of isotropic scattering.** A point at the distance d from the centre of a
+sphere of radius R and radiance Le receives the fluence
 
     Phi = Le int exp(-sigma_t r) domega
 

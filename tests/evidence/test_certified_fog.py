@@ -27,7 +27,7 @@ from tests.evidence.closed_forms import sphere_airlight
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = [scene.name for scene in fog_scenes()]
 SCENES = {scene.name: scene for scene in fog_scenes()}
-# One ray of each kind: endless, near a light, ended by a sphere, among needles, in the fading part of a spot, dark.
+# One ray of each kind: unbounded, near a light, ended by a sphere, among needles, in the fading part of a spot, dark.
 SOME = {
     "thin-open": 27,
     "near-light": 36,

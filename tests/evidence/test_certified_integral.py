@@ -90,7 +90,7 @@ def case(**changes):
 
 
 @pytest.mark.parametrize(("name", "g"), [("rayleigh", 0.0), ("hg", -0.9)])
-def test_an_endless_ray_agrees_with_quadratures_that_cut_it_elsewhere(name, g):
+def test_an_unbounded_ray_agrees_with_quadratures_that_cut_it_elsewhere(name, g):
     """The two quadratures of `tests.evidence.certified.integral` share no code with the program."""
     row = case(phase=name, g=str(g), x1="inf", sigma_t="0.001")
     separate = integrate_certified(2.0, 0.5, 0.0, float("inf"), 0.001, PhaseFunction(name, g=g), digits=25)

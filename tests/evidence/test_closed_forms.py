@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Closed forms of lights with extent and the oracle of light volumes are right themselves."""
+"""Closed forms of area lights and the oracle of light volumes are right themselves."""
 
 import mitsuba as mi
 import numpy as np
@@ -18,7 +18,7 @@ from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 
 
-def test_a_sphere_in_clear_air_fills_its_cone():
+def test_a_sphere_in_vacuum_fills_its_cone():
     distance = np.array([1.0001, 1.5, 7.0, 1e4])
     cone = np.pi / distance**2 * 2 / (1 + np.sqrt((1 - 1 / distance) * (1 + 1 / distance)))
     assert sphere_fluence(0.0, distance, 1.0) == pytest.approx(cone, rel=1e-12)
@@ -67,7 +67,7 @@ def test_nothing_hides_nothing(variant, lamp):
 
 
 def plane_below(depth, size):
-    """Return the shadow map of an endless horizontal plane below a point light, whose horizon is on borders of texels.
+    """Return the shadow map of an unbounded horizontal plane below a point light, its horizon on borders of texels.
 
     Its height is -k_z / depth where a direction k points down, 0 elsewhere.
     """

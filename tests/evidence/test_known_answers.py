@@ -188,7 +188,7 @@ def test_fluence_of_first_order(variant, r):
 
 @pytest.mark.claim("known-answers")
 def test_a_floor_in_an_absorbing_medium(variant):
-    """It is dimmed by exp(-sigma_t (camera to floor + floor to light)), and there is no airlight."""
+    """It is attenuated by exp(-sigma_t (camera to floor + floor to light)), and there is no airlight."""
     sigma_t = 0.75
     scene = replace(fog_scene(), lights=fog_scene().lights[:1], occluders=(floor(),), albedo=(0.0,) * 3)
     clear, dim = (reference_of(white(mitsuba_dict(replace(scene, sigma_t=(each,) * 3)))) for each in (0.0, sigma_t))

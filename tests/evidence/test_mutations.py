@@ -43,7 +43,7 @@ def stage_of(variant):
 
 @pytest.mark.parametrize("mutation", [*MUTATIONS, *SHARED, BELOW_THE_MARGIN], ids=lambda mutation: mutation.name)
 def test_what_a_fault_names_is_there(variant, mutation):
-    """Whoever moves or rewrites a formula must move its fault: it must not vanish unnoticed."""
+    """Anyone who moves or rewrites a formula must move its fault: it must not vanish unnoticed."""
     change = mutation.change
     assert rewritten(change) if isinstance(change, Rewrite) else replacements(change)
 

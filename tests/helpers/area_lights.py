@@ -49,7 +49,7 @@ def ring(place=(0.3, 0.4, 2.9), *, size=1.0, **changes: Any):
 
 
 def fog(sigma_t=0.21, albedo=0.83) -> dict[str, Any]:
-    """Return an endless medium."""
+    """Return an unbounded medium."""
     return {
         "type": "homogeneous",
         "sigma_t": {"type": "rgb", "value": [sigma_t] * 3},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of small scenes that tests share: a process renders each once, whoever looks at it.
+"""Frames of small scenes that tests share: a process renders each once, anyone who looks at it.
 
 Scenes are read again for each frame: Dr.Jit's virtual calls go over all shapes that are alive. A scene that holds
 shapes of Mitsuba, such as meshes, has no description to find its frame by, and is rendered each time.

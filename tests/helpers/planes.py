@@ -7,29 +7,29 @@ from realtime.methods.shadow_planes.plane_table import NUMBER, index_planes, lig
 from realtime.methods.shadow_planes.sweep import ray_planes
 from realtime.numerics.array_types import array_types
 from realtime.numerics.functions import host_diamond_angle
-from realtime.scene.mesh_adjacency import make_casters
-from tests.helpers.casters import ALL
+from realtime.scene.mesh_adjacency import make_occluders
+from tests.helpers.occluders import ALL
 
 LIGHT = np.array([1.23, -0.87, 1.61])
 CAMERA = np.array([-1.57, -1.93, 0.71])
 
 
-def casters_of(*names):
-    """Return the casters of meshes for tests."""
-    return make_casters([(name, *ALL[name]()) for name in names])
+def occluders_of(*names):
+    """Return the occluders of meshes for tests."""
+    return make_occluders([(name, *ALL[name]()) for name in names])
 
 
-def index_of(casters, light=LIGHT, camera=CAMERA, precision="single", *, order="exact"):
+def index_of(occluders, light=LIGHT, camera=CAMERA, precision="single", *, order="exact"):
     """Return the index of the shadow planes of all components."""
-    used = np.ones(len(casters.closed), dtype=bool)
+    used = np.ones(len(occluders.closed), dtype=bool)
     light, camera = np.asarray(light, dtype=float), np.asarray(camera, dtype=float)
-    return index_planes(casters, light, camera, used=used, types=array_types(precision), order=order)
+    return index_planes(occluders, light, camera, used=used, types=array_types(precision), order=order)
 
 
 def bundles(count, *, spread, light=LIGHT, camera=CAMERA, seed=1):
     """Return unit directions in the frame of the light, (count, 3): in bundles of sixteen, `spread` wide.
 
-    Three quarters lead to points in and behind the casters, an eighth close by the light and an eighth away from it,
+    Three quarters lead to points in and behind the occluders, an eighth close by the light and an eighth away from it,
     where all azimuths meet.
     """
     rng = np.random.default_rng(seed)

@@ -29,7 +29,7 @@ from validation.estimates.quadrature import reference_layer
 Array = NDArray[np.float64]
 
 _CHECKS = 2  # random shadow rays to each ray
-_POINTS = 128  # of lights with extent: 0.03 % off in the mean
+_POINTS = 128  # of area lights: 0.03 % off in the mean
 _HOLDS = "total"
 _FOOT = 0.3048  # [m]
 _LOBE = PhaseFunction("hg", g=0.43)
@@ -148,7 +148,7 @@ def _other_axis(positions: Array, size: tuple[int, int]) -> Array:
 
 
 def _darker_corners(reference: ReferenceScene) -> Array:
-    """Return an image as a lens shows it: dimmed by the fourth power of the cosine, here 1/sqrt(1 + tan^2)."""
+    """Return an image as a lens shows it: attenuated by the fourth power of the cosine, here 1/sqrt(1 + tan^2)."""
     width, height = reference.width, reference.height
     half = np.tan(0.5 * np.deg2rad(float(mi.traverse(reference.scene.sensors()[0])["x_fov"][0])))
     column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)

@@ -5,9 +5,9 @@
 fog. Each built-in scene has one light, without a soft edge and before the camera, and no fog scatters backward. So only
 this scene can reveal a fault in the formula for soft spots or in the sum over lights.
 
-`wide-lights`, in `WIDE_PROBES`, has lights with extent of each shape, black ones and one of material `null`, some in
-view, before casters. Plates before the disk hide the corners of a square around it, whose light would nearly be that of
-the disk. Its reference takes many points of each light, so it is tried with faults of such lights alone.
+`wide-lights`, in `WIDE_PROBES`, has area lights of each shape, black ones and one of material `null`, some in
+view, before occluders. Plates before the disk hide the corners of a square around it, whose light would nearly be that
+of the disk. Its reference takes many points of each light, so it is tried with faults of such lights alone.
 
 `sun` has a directional light on two bounded media, a box and a sphere of coloured fog, with occluders before them.
 """
@@ -120,5 +120,5 @@ def wide_lights() -> dict[str, Any]:
 
 #: Scenes of this module by name, as in `validation.scenes.registry.SCENES`.
 PROBES = {"many-lights": many_lights, "sun": sun}
-#: The same of lights with extent.
+#: The same of area lights.
 WIDE_PROBES = {"wide-lights": wide_lights}

@@ -41,7 +41,7 @@ def pearl(sigma_t: Any = 1.3, albedo=(0.2, 0.5, 0.8), **medium: Any) -> dict[str
 
 
 def sunny(*, size=(12, 9), **changes: Any) -> dict[str, Any]:
-    """Return a camera in clear air and a sun; `changes` add or replace entries."""
+    """Return a camera in vacuum and a sun; `changes` add or replace entries."""
     scene = clear_scene(size=size, lamp=None, sun=sun()) | changes
     scene["sensor"] |= {"fov": 25.0}  # both media fill most of the view
     return scene

@@ -29,16 +29,16 @@ def traced(scene, batches, samples=64):
     return quadrature_image(reference), done
 
 
-def caster():
+def occluder():
     return tiny_scene()["ball"] | {"center": [0.3, 0.45, 1.2], "radius": 0.21}
 
 
 CASES = {
     "box and sphere": lambda: sunny(
-        size=(16, 12), brick=brick(**HG), pearl=pearl(), caster=caster(), **ball_over_floor()
+        size=(16, 12), brick=brick(**HG), pearl=pearl(), occluder=occluder(), **ball_over_floor()
     ),
     "thick, light from behind": lambda: sunny(
-        size=(16, 12), brick=brick((0.71, 0.3, 0.02), scale=3.1), sun=sun([0.1, -1.0, -0.2]), caster=caster()
+        size=(16, 12), brick=brick((0.71, 0.3, 0.02), scale=3.1), sun=sun([0.1, -1.0, -0.2]), occluder=occluder()
     ),
     "two suns and a lamp": lambda: sunny(
         size=(16, 12),

@@ -41,8 +41,8 @@ def _other_axis(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 
 def _vignette(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-    dimmed = predictor.cosines[:, None] ** p[0]
-    return replace(guess, values=(*guess.values, lambda radiance: radiance * dimmed))
+    attenuated = predictor.cosines[:, None] ** p[0]
+    return replace(guess, values=(*guess.values, lambda radiance: radiance * attenuated))
 
 
 #: What is said of an image that is turned, and what undoes it: itself.

@@ -151,7 +151,7 @@ def agreements(
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 
-    By estimator there are the `margins` of the relative bias [1], under lights with extent at least `WIDE_MARGIN`, and
+    By estimator there are the `margins` of the relative bias [1], under area lights at least `WIDE_MARGIN`, and
     the `samples`; each takes so many `batches` and `seconds` at most. The result is by estimator and layer, as in
     'volpath airlight'.
     """

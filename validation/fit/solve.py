@@ -70,7 +70,7 @@ _LINEAR = 1e-3  # of a number on the whole line: in so short a step the image is
 _CLOSE = 0.02  # of half an interval
 _TURNS = 10  # where so many do not reach an end, there is none
 _GROWTH = 3.0  # of a step, at most
-_ENDLESS = 30.0  # a factor of 10^13: where an image allows it, there is no end
+_UNBOUNDED = 30.0  # a factor of 10^13: where an image allows it, there is no end
 
 
 @dataclass(frozen=True)
@@ -319,7 +319,7 @@ def _end(model: ImageModel, unknowns: Sequence[Unknown], solution: Solution, num
         else:
             below, above = (distance, beyond), (above[0], 0.5 * above[1])
         if math.isnan(above[0]):
-            if abs(distance) > _ENDLESS:
+            if abs(distance) > _UNBOUNDED:
                 break
             distance *= min(1.1 * SIGMAS / max(errors, 1e-9), _GROWTH)
         else:

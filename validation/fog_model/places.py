@@ -159,8 +159,8 @@ def parallel_nodes(
     owner, place, weight = panel_nodes(np.zeros(len(width)), depth, most=_DEEP, short=_SHALLOW)
     place, weight, ray = place / depth[owner], weight / depth[owner], pieces.ray[owner]
     x, direction = pieces.x0[owner] + width[owner] * place, reference.direction[ray]
-    point, endless = reference.origin + x[:, None] * direction, np.full(len(x), np.inf)
-    leg = lengths(reference, point, np.broadcast_to(-light.direction, point.shape), endless)
+    point, unbounded = reference.origin + x[:, None] * direction, np.full(len(x), np.inf)
+    leg = lengths(reference, point, np.broadcast_to(-light.direction, point.shape), unbounded)
     camera, medium = lengths(reference, reference.origin, direction, x), pieces.medium[owner] + 1
     value = (weight * width[owner])[:, None]
     return Places(ray, x, np.ones_like(x), 0 * direction, camera, leg, medium, rays.foot[ray], value)

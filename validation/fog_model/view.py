@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.light_airlight import lit_parallel_rays, lit_rays
-from reference.quadrature.light_points import light_points
 from reference.quadrature.replicates import PointPlan, square_points
+from reference.quadrature.shared_samples import shared_samples
 from reference.quadrature.surface import surface_hits
 from reference.scene.area_light import ReferenceAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
@@ -256,7 +256,7 @@ def light_sources(reference: ReferenceScene, samples: int = SAMPLES, radius: flo
         Source(
             light.name,
             light.radiance * light.area / samples,
-            light_points(light, square_points(plan, number, 0, light.kind)),
+            shared_samples(light, square_points(plan, number, 0, light.kind)),
             light.centre if light.kind == "sphere" else None,
             light,
         )
@@ -272,7 +272,7 @@ def _as_sphere(name: str, light: ReferenceLight, plan: PointPlan, radius: float)
     4 pi R^2/N, of the intensity L 4 pi R^2/N along its normal: four times that of the light over N.
     """
     wide = ReferenceAreaLight("sphere", light.position, np.eye(3), np.full(2, radius), np.zeros(3), False, None)
-    samples = light_points(wide, square_points(plan, 0, 0, "sphere"))
+    samples = shared_samples(wide, square_points(plan, 0, 0, "sphere"))
     return Source(name, 4 * light.intensity / plan.most, samples, light.position)
 
 

@@ -5,7 +5,7 @@ Three sets, each the same on every machine:
 
 * `hard_rays` covers every magnitude: optical depth 1e-6 to 60 (of the shortest way camera, segment, light), height over
   distance 1e-7 to 1, scale 1e-6 to 1e6, |g| up to 0.95, light before and behind the camera, segments from 1e-3 to 1e3
-  distances and endless ones, all phase functions.
+  distances and unbounded ones, all phase functions.
 * `slivers` are short segments far from the camera and from the light: what a light volume adds up as differences of
   J(0, x).
 * `wide_rays` is the set W on which costs are compared: optical depth 1e-4 to 60 at the distance of the light (what is

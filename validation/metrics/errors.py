@@ -29,7 +29,7 @@ _RELATIVE = "|error| over the reference, or over a thousandth of its mean where 
 class Metrics:
     """Error of a test image against a reference.
 
-    Whoever sees `nonfinite` above zero must call the comparison failed.
+    Anyone who sees `nonfinite` above zero must call the comparison failed.
     """
 
     pixels: int = column("pixels", "pixels", "compared, those of the mask, with or without finite values")

@@ -7,7 +7,7 @@ should be, of the medium alone. The constant A that fits best is a least-squares
 image. What is then left over is taken from two images M1, M2 of other seeds, sqrt(mean((M1 - m)(M2 - m)) / mean(M1
 M2)), so that the noise of the paths does not count.
 
-*The constant R* (section 4.2). The camera looks at a sphere of one medium in clear air, which a lamp outside the sphere
+*The constant R* (section 4.2). The camera looks at a sphere of one medium in vacuum, which a lamp outside the sphere
 lights from above. R, the mean distance between a point of the boundary and a point of the medium, is 1.2 radii in a
 sphere. A path from far away has a mean length of 0.75 radii within the sphere (the mean of half a chord over the
 volume): R is 60 % too long, and the airlight too dark by about exp(-0.45 sigma_t radius).
@@ -102,7 +102,7 @@ def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
     """
     biases, ratios = [], []
     for size, depth in product(SIZES, OPTICAL_DEPTHS):
-        scene = read_scene(mi.load_dict(sphere_in_clear_air(size, depth, image)), "double")
+        scene = read_scene(mi.load_dict(sphere_in_vacuum(size, depth, image)), "double")
         exact = _airlight(scene, "exact")
         forms = [("paper", "exact"), ("paper", "taylor"), ("printed", "exact")]
         paper, taylor, printed = (
@@ -119,7 +119,7 @@ def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
     }
 
 
-def sphere_in_clear_air(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
+def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
     """Return a sphere of fog as high as the view, and a lamp at radius/size from its centre."""
     lamp = _LAMP / np.linalg.norm(_LAMP) * (_RADIUS / size)
     medium = {

@@ -4,7 +4,7 @@
 The source prints no equation, no scene and no table of errors; the method is reconstructed from captions. It gives:
 
 * Fig. 5.8: R1 150 samples along each ray, R2 32, R3 32 and a Gaussian, R4 32 and the bilateral filter;
-* Fig. 4.8: 3 light points with hd = 3, hr = 0.5;
+* Fig. 4.8: 3 light samples with hd = 3, hr = 0.5;
 * Fig. 4.19: 4, 8, 16, 32 taps.
 
 Errors are those of airlight plus surface, as root mean square over the mean, against the quadrature, and in the

@@ -13,7 +13,7 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.scene.mesh_adjacency import read_casters
+from realtime.scene.mesh_adjacency import read_occluders
 from realtime.scene.phase import Phase
 from realtime.scene.read_scene import Scene
 from validation.properties.view import SeenView, optical_depth, see
@@ -102,9 +102,9 @@ def _meshes(scene: Scene) -> list:
 def _silhouettes(view: SeenView) -> float:
     """Return the silhouette edges of all lights together, 0 where shapes have none."""
     try:
-        casters = read_casters(view.scene.geometry, view.scene.area_lights)
+        occluders = read_occluders(view.scene.geometry, view.scene.area_lights)
     except InputError:
         return 0.0
     weights = [0.0 if light.kind == "directional" else 1.0 for light in view.lights]
     ends = [np.append(light.place, weight) for light, weight in zip(view.lights, weights, strict=True)]
-    return float(sum(len(silhouette(casters, end).edges) for end in ends))
+    return float(sum(len(silhouette(occluders, end).edges) for end in ends))

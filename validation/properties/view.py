@@ -26,8 +26,8 @@ class LightPlace:
 
     kind: str  #: 'point', 'spot', 'directional' or 'area'
     place: Array  #: (3,) [m]; of a directional light where it comes from, a unit vector
-    radius: float = 0.0  #: of the ball around a light with extent [m]
-    axis: Array | None = None  #: of a spot, or the normal of a flat light with extent
+    radius: float = 0.0  #: of the ball around an area light [m]
+    axis: Array | None = None  #: of a spot, or the normal of a flat area light
     cos_cutoff: float = 0.0  #: of a spot's cone; 0 for a flat light, which shines on one side
 
     def toward(self, points: Array) -> tuple[Array, Array]:

@@ -34,7 +34,7 @@ from realtime.scene.animate import (
     with_area_lights,
 )
 from realtime.scene.media.medium import Homogeneous
-from realtime.scene.mesh_adjacency import read_casters
+from realtime.scene.mesh_adjacency import read_occluders
 from realtime.scene.read_scene import Scene
 from validation.scenes.meshes import rotation
 from validation.scenes.registry import MOVES, Animation
@@ -76,7 +76,7 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
 def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, ...]] | None:
     """Return what a frame changes in its scene, by the names of `validation.scenes.changes`.
 
-    None where these names cannot say it: lights with extent, media that are not the same everywhere.
+    None where these names cannot say it: area lights, media that are not the same everywhere.
     """
     moves = set(animation.moves)
     homogeneous = moved.medium if isinstance(moved.medium, Homogeneous) else None
@@ -111,7 +111,7 @@ def _objects(scene: Scene, animation: Animation) -> Objects | None:
     if "objects" not in animation.moves:
         return None
     lamps = {light.name for light in scene.area_lights}
-    closed = closed_shapes(read_casters(scene.geometry, scene.area_lights))
+    closed = closed_shapes(read_occluders(scene.geometry, scene.area_lights))
     names = animation.objects or tuple(name for name in closed if name not in lamps)
     if not names:
         raise InputError("--animate objects: the scene has no closed mesh that could turn; animate the light")

@@ -3,12 +3,12 @@ r"""The error of an image by its causes: differences of renders, which add up to
 
 A method says which of its parameters make errors (`realtime.methods.interface.method.Method.error_causes`). They are
 taken away one on top of the other: R_0 is the image as asked for, R_1 that without the first cause, and so on to R_n,
-the best that the method can do. E is the exact sum over the same light points, by `shadow-planes` with the kernel
+the best that the method can do. E is the exact sum over the same light samples, by `shadow-planes` with the kernel
 `exact`, and T the reference. Then
 
     R_0 - T = (R_0 - R_1) + (R_1 - R_2) + ... + (R_n - E) + (E - T),
 
-pixel by pixel: by its causes, the rest, and the light points in place of the light's extent. In a scene without lights
+pixel by pixel: by its causes, the rest, and the light samples in place of the light's extent. In a scene without lights
 with extent E is the reference. If the method says that its last cause is all that is left, that takes the rest.
 
 With <a, b> the mean of a b over pixels and channels, the *share* of a part P in the error D = R_0 - T is
@@ -34,7 +34,7 @@ from validation.study.configuration import Configuration
 
 Array = NDArray[np.float64]
 
-REST, POINTS = "rest", "light points"
+REST, POINTS = "rest", "light samples"
 
 
 #: What a table says of a part of an error, and its signed image, (height, width, 3) [W/(m^2 sr)]: `cause`; `without`,

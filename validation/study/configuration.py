@@ -84,7 +84,7 @@ def configuration(
     except MethodError as error:
         raise InputError(str(error)) from error
     try:
-        chosen, light_points = method_parameters(record, parameters or {})
+        chosen, light_samples = method_parameters(record, parameters or {})
     except MethodError as error:
         raise InputError(str(error)) from error
     uses_kernel = chosen.uses_kernel
@@ -93,7 +93,7 @@ def configuration(
     if uses_kernel:
         kernel = kernel or "exact"
         find_kernel(kernel)
-    known = values(light_points) | values(chosen)
+    known = values(light_samples) | values(chosen)
     return Configuration(method, kernel, tuple((name, known[name]) for name in parameters or {}))
 
 
@@ -129,7 +129,7 @@ def rendered_lights(scene: Scene, chosen: Configuration) -> int:
     A user's module is not imported for it: its method counts as one that has the points of others.
     """
     method = find_method("unshadowed" if is_users(chosen.method) else chosen.method)
-    points = dict(chosen.parameters).get("points", method.light_points.points)
+    points = dict(chosen.parameters).get("points", method.light_samples.points)
     return len(scene.lights) + int(points) * len(scene.area_lights)
 
 

@@ -19,7 +19,7 @@ with wavelengths from a quarter to a thirtieth of the scene's size. The norms of
 up to 0.6 < 1: it is one to one, so that closed meshes stay closed, and what was disjoint is disjoint. Its bumps turn
 smooth outlines into silhouettes of which more and more edges are found as triangles shrink below the wavelengths, about
 the root of their number. Equal places move equally, so that seams of doubled vertices stay closed. Bounds of media and
-lights with extent stay as they are: they must be convex, or of their shape.
+area lights stay as they are: they must be convex, or of their shape.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -100,7 +100,7 @@ def _lights(name: str, size: tuple[int, int]) -> list[Step]:
     scene = _read(name, size)
     count = len(scene.lights)
     if not count:
-        raise InputError(f"scaling lights: {name} has lights with extent only; wanted a point, spot or directional one")
+        raise InputError(f"scaling lights: {name} has area lights only; wanted a point, spot or directional one")
     return [Step(count * copies, partial(with_copies, scene, copies)) for copies in _COPIES]
 
 

@@ -97,13 +97,13 @@ def light_references(
     """Return the airlight of the reference of each frame, (height, width, 3); in the end the scene is as it was.
 
     `scene`: the `mi.Scene`; `places`: the scene of each frame, of which `moves` says what moves, the first as it is
-    now; `progress`: called with the number of a frame and what. Raises InputError for lights with extent.
+    now; `progress`: called with the number of a frame and what. Raises InputError for area lights.
     """
     changes = [frame_changes(each, moves) for each in places]
     references: list[Array] = []
     for number, change in enumerate([*changes, changes[0]]):
         if not change:
-            raise InputError("the scene has lights with extent, which do not circle; wanted a scene without")
+            raise InputError("the scene has area lights, which do not circle; wanted a scene without")
         change_scene(scene, change)
         if number < len(places):
             if progress is not None:

@@ -28,7 +28,7 @@ from validation.study.study import Cell
 
 Array = NDArray[np.float64]
 
-# Points of lights with extent: a ray has enough at a standard error of 2 %, and has never more than 8 times 4. Each
+# Points of area lights: a ray has enough at a standard error of 2 %, and has never more than 8 times 4. Each
 # point takes as long as a point light does, and surfaces take as long again: these are left out.
 _PLAN = PointPlan(error=2e-2, first=2, most=4, surfaces=False)
 
@@ -37,7 +37,7 @@ _SHARE = 16  # one pixel in so many has a reference where lights have an extent
 _LEAST = 64  # pixels that have one
 _SEED = 20261123  # of their choice
 _UNKNOWN = Spent(0.0, 0.0)
-_STANDARD_ERRORS = 3.0  # that a bound has of a light with extent
+_STANDARD_ERRORS = 3.0  # that a bound has of an area light
 
 
 @dataclass(frozen=True)

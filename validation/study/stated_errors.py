@@ -55,7 +55,7 @@ _BETWEEN = 1.1  # times the largest of these no place scatters
 def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
     """Return the relative error that a method states for itself in a scene, ends left aside [1]; None for none.
 
-    Points in the place of lights with extent are an approximation.
+    Points in the place of area lights are an approximation.
     """
     usual_values = defaults(METHODS[chosen.method]) if chosen.method in METHODS else {}
     usual = all(usual_values.get(name, value) == value for name, value in chosen.parameters if name != "map")

@@ -276,10 +276,10 @@ class TransportGrid:
         source += _between(Float, self.sources, number, place, self.fine)
         sigma = dr.exp(log_sigma)
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
-        dimmed = dr.clip(mu_l / coordinates.LOWEST_SUN, 0, 1) * dr.minimum(t / coordinates.THINNEST, 1)
+        attenuated = dr.clip(mu_l / coordinates.LOWEST_SUN, 0, 1) * dr.minimum(t / coordinates.THINNEST, 1)
         angle = dr.safe_acos(cosine) * dr.inv_pi
         (scattered,) = between_entries(self.angular, [(angle, ENTRIES)], first=number)
-        T = scattered * _passed(t, d, mu) * dr.exp(source) * dimmed
+        T = scattered * _passed(t, d, mu) * dr.exp(source) * attenuated
         return T, x * sigma, dr.mulsign(y, sin_phi) * sigma, sigma
 
 

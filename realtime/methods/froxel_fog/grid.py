@@ -98,7 +98,7 @@ def column_rays(view: View, grid: Grid) -> Rays:
 def _frame_depth(view: View) -> Metres:
     """Return the depth of the farthest surface, or where rays meet none, where too little light comes from to matter.
 
-    Grids, and media in clear air, end by themselves.
+    Grids, and media in vacuum, end by themselves.
     """
     Float, medium, forward = type(view.distance), view.medium, view.camera.forward
     met = dr.isfinite(view.distance)

@@ -36,7 +36,7 @@ from realtime.methods.interface.method import View
 from realtime.numerics.array_types import PerRay
 from realtime.numerics.functions import summed
 from realtime.rays import profile
-from realtime.scene.light_points import LightFrame, frame_at
+from realtime.scene.light_samples import LightFrame, frame_at
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Rays
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
@@ -50,8 +50,8 @@ _UNROLLED = 4  # lights in one kernel where media have bounds: no loop can write
 
 
 @dataclass(frozen=True)
-class LightPointTable:
-    """The points of one light with extent."""
+class LightSampleTable:
+    """The points of one area light."""
 
     source: int  #: the number of the light
     count: int  #: how many points it has
@@ -86,7 +86,7 @@ def scattered_light(
     rays: Rays,
     *,
     shift: tuple[Any, Any, Any],
-    tables: tuple[LightPointTable, ...],
+    tables: tuple[LightSampleTable, ...],
     visible: Visibility,
 ) -> PerRay:
     """Return the light that each froxel scatters to the camera, a colour [W/(m^3 sr)].
@@ -127,10 +127,10 @@ def _froxel_points(view: View, grid: Grid, rays: Rays, shift: tuple[Any, Any, An
     return FroxelPoints(point, unit, _least_square(grid, begin, end), rays, (begin * length, end * length))
 
 
-def _sum_over_points(view: View, table: LightPointTable, like: Light, points: FroxelPoints) -> Any:
+def _sum_over_points(view: View, table: LightSampleTable, like: Light, points: FroxelPoints) -> Any:
     """Return the sum of the weights of the points of a light, in one loop.
 
-    All that a weight needs follows from the coordinates of a froxel in the frame of the light point, c along its
+    All that a weight needs follows from the coordinates of a froxel in the frame of the light sample, c along its
     normal: r, the cosine c/r at the light, and the place in its map.
     """
     medium = view.medium

@@ -19,11 +19,11 @@ from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pixels
 from realtime.methods.froxel_fog.grid import column_rays, view_grid
-from realtime.methods.froxel_fog.injection import LightPointTable, Visibility, frame_shift, scattered_light
+from realtime.methods.froxel_fog.injection import LightSampleTable, Visibility, frame_shift, scattered_light
 from realtime.methods.interface.method import Layers, Method, View
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import parameter
-from realtime.scene.light_points import frame_at, light_frames
+from realtime.scene.light_samples import frame_at, light_frames
 from realtime.scene.lights import Light
 from realtime.shadow_maps.hemisphere_map import cast_hemisphere_maps, maps_memory
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_maps, lit_in_map, map_memory, map_size
@@ -36,7 +36,7 @@ class FroxelShadows:
     """What the froxels of a frame need of its lights."""
 
     maps: tuple[ShadowMap, ...]  #: of the lights without extent; () where rays are cast
-    tables: tuple[LightPointTable, ...]  #: of the others
+    tables: tuple[LightSampleTable, ...]  #: of the others
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class FroxelFog(Method):
     shadow: str = parameter("map", "a look-up in a shadow map a froxel, or a shadow ray", choices=("map", "ray"))
     map: int = map_size(
         512,
-        "texels on a side of a face of the map, with `shadow=map`; half as many for each point of a light with extent",
+        "texels on a side of a face of the map, with `shadow=map`; half as many for each point of an area light",
     )
 
     def _check_together(self) -> None:
@@ -81,7 +81,7 @@ class FroxelFog(Method):
 
     @property
     def point_map(self) -> int:
-        """Texels on a side of the map of a light point: the errors of many maps average, and a froxel is no smaller."""
+        """Texels on a side of the map of a light sample: errors of many maps average, and a froxel is no smaller."""
         return max(self.map // 2, 4)
 
     @property
@@ -129,7 +129,7 @@ class FroxelFog(Method):
         count, frames, maps = len(points), light_frames(points), None
         if with_maps:
             maps = cast_hemisphere_maps(geometry, frames, count, self.point_map, for_surfaces=False)
-        return LightPointTable(source, count, frames, maps)
+        return LightSampleTable(source, count, frames, maps)
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
@@ -155,7 +155,7 @@ def _visibility(view: View, shadows: FroxelShadows, shadow: str) -> Visibility:
             return view.visible(point, light)
         if light.source is None:
             return lit_in_map(shadows.maps[number], light, point)
-        # In bounded media light points come one by one.
+        # In bounded media light samples come one by one.
         table = next(table for table in shadows.tables if table.source == light.source)
         before = next(index for index, other in enumerate(view.lights) if other.source == light.source)
         assert table.maps is not None

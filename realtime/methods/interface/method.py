@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
-from realtime.area_lights.points import LightPoints
+from realtime.area_lights.points import LightSamples
 from realtime.errors import InputError
 from realtime.numerics.array_types import Metres, PerRay
 from realtime.numerics.noise import PATTERNS, Noise
@@ -193,7 +193,7 @@ class Method(Parameters):
     #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate the surfaces.
     renders_clouds: ClassVar[bool] = False
     layers: ClassVar[tuple[str, ...]] = ()  #: the names that `Layers.extra` may have
-    light_points: ClassVar[LightPoints] = LightPoints()  #: how it renders area lights by default
+    light_samples: ClassVar[LightSamples] = LightSamples()  #: how it renders area lights by default
 
     # What a frame must know. Each may be a property that follows from the parameters.
     prepared_from: ClassVar[frozenset[str]] = frozenset(MOVABLE)  #: what `prepare` looks at; else its state is kept
@@ -300,7 +300,7 @@ def tolerance() -> Any:
     )
 
 
-def method_parameters(method: type[Method], given: Mapping[str, Any]) -> tuple[Method, LightPoints]:
+def method_parameters(method: type[Method], given: Mapping[str, Any]) -> tuple[Method, LightSamples]:
     """Return a method with its parameters, and those of area lights, which all methods have in common.
 
     `given` are values by name; a word is converted to the type of the default.
@@ -310,9 +310,9 @@ def method_parameters(method: type[Method], given: Mapping[str, Any]) -> tuple[M
     InputError
         As `realtime.parameters.read_parameters`.
     """
-    common = [item.name for item in fields(LightPoints) if item.name not in defaults(method)]
+    common = [item.name for item in fields(LightSamples) if item.name not in defaults(method)]
     own = {name: value for name, value in given.items() if name not in common}
     asked = {name: value for name, value in given.items() if name in common}
     chosen = read_parameters(method.name, method, own, others=common)
-    read = values(read_parameters(method.name, LightPoints, asked))
-    return chosen, replace(method.light_points, **{name: read[name] for name in asked})
+    read = values(read_parameters(method.name, LightSamples, asked))
+    return chosen, replace(method.light_samples, **{name: read[name] for name in asked})

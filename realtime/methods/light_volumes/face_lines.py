@@ -7,7 +7,8 @@ has
     u = (a0 + x da) / c,   v = (b0 + x db) / c,   s = 1 / c,   c = c0 + x dc,
 
 and y = x / c. All four are linear along the projective line: with t from 0 to 1 between two points of the ray, each is
-(1 - t) its value at one and t its value at the other, and x = y / s. At the end of an endless ray s = 0 and y = 1 / dc.
+(1 - t) its value at one and t its value at the other, and x = y / s. At the end of an unbounded ray s = 0 and y = 1 /
+dc.
 
 Of a directional light's face u, v and s are linear in x itself, so y = x with weight 1 in place of s; the
 ray is cut where s = 0, and all before the largest height is lit.

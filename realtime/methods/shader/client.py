@@ -51,7 +51,7 @@ class ShaderHost:
         InputError
             If it ended, or did not answer in time.
         """
-        import numpy as np  # here: whoever prints help has this module too
+        import numpy as np  # here: anyone who prints help has this module too
 
         packed = io.BytesIO()
         words = np.array(json.dumps(message | {"kind": kind}))

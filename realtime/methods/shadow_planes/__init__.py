@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow planes: volumetric shadows from the silhouettes of casters, without shadow rays and shadow maps.
+"""Shadow planes: volumetric shadows from the silhouettes of occluders, without shadow rays and shadow maps.
 
 Silhouettes become planes through the light when the light, the camera or occluders move; the planes are sorted into
 wedges of azimuth about the axis from light to camera. Each ray adds up the lit intervals between the planes of its
@@ -14,5 +14,5 @@ Read in this order:
 - `published_crossings.py`: the sum of the paper, plane by plane with a stencil.
 - `published_mesh.py`: its Gamma at the vertices of meshes.
 - `published_media.py`: its Gamma in bounded media, medium by medium.
-- `plane_counts.py`: how many casters, edges and planes there are, for `--plan`.
+- `plane_counts.py`: how many occluders, edges and planes there are, for `--plan`.
 """

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shadow planes: volumetric shadows from silhouettes, without shadow rays.
 
-The silhouette of every caster, as the light sees it (`realtime.methods.shadow_planes.silhouettes`), extruded away from
-the light, bounds what is in shadow. A camera ray crosses these planes, and between crossings it is lit or not as a
+The silhouette of every occluder, as the light sees it (`realtime.methods.shadow_planes.silhouettes`), extruded away
+from the light, bounds what is in shadow. A camera ray crosses these planes, and between crossings it is lit or not as a
 whole. With Gamma(x) the airlight of a lit ray from the camera to x (eq. 2), a ray with lit segments [a_i, b_i] has the
 airlight
 
@@ -42,7 +42,7 @@ from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.lights import Light, host_position
 from realtime.scene.media.bounded_rays import FORMS, BoundedRays
 from realtime.scene.media.medium import LitRays
-from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
+from realtime.scene.mesh_adjacency import Occluders, read_occluders, with_positions
 from realtime.scene.read_scene import Scene
 
 
@@ -50,9 +50,9 @@ from realtime.scene.read_scene import Scene
 class ShadowPlanes(Method):
     """The airlight between shadow planes.
 
-    Valid for all lights and casters that are triangle meshes, closed or not. Shadows are those of the triangles, exact
-    to rounding, with order=exact. Bounded media have nodes of their own, but for a polynomial kernel. With buffer=8bit
-    the in-scattered radiance is what the buffer holds less the lit surfaces.
+    Valid for all lights and occluders that are triangle meshes, closed or not. Shadows are those of the triangles,
+    exact to rounding, with order=exact. Bounded media have nodes of their own, but for a polynomial kernel. With
+    buffer=8bit the in-scattered radiance is what the buffer holds less the lit surfaces.
 
     References
     ----------
@@ -149,12 +149,12 @@ class ShadowPlanes(Method):
         return self.order == "exact" and self.evaluation == "pixel" and self.buffer == "float"
 
     def preparation(self, scene):
-        """Read the casters of a scene and return what finds the shadow planes of a frame.
+        """Read the occluders of a scene and return what finds the shadow planes of a frame.
 
-        Raises InputError for casters without triangles.
+        Raises InputError for occluders without triangles.
         """
-        casters = read_casters(scene.geometry, scene.area_lights)
-        return PlanePreparation(casters, self.cone, self.order) if scene.features.shadows else no_state
+        occluders = read_occluders(scene.geometry, scene.area_lights)
+        return PlanePreparation(occluders, self.cone, self.order) if scene.features.shadows else no_state
 
     def check(self, scene):
         """Refuse bounded media that vertices cannot have."""
@@ -256,9 +256,9 @@ class ShadowPlanes(Method):
 
 @dataclass(frozen=True)
 class PlanePreparation:
-    """The casters of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
+    """The occluders of a scene; called with the scene as it is now, returns the shadow planes of its lights."""
 
-    casters: Casters
+    occluders: Occluders
     cone: int = 0  #: edges of the cone of a spot; 0: no planes for it
     order: str = "exact"  #: in which rays go over planes
 
@@ -269,7 +269,7 @@ class PlanePreparation:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What planes in the order of a paper do not count right; in the exact order all is right."""
-        return () if self.order == "exact" else tuple(self.casters.warnings)
+        return () if self.order == "exact" else tuple(self.occluders.warnings)
 
     def start(self, scene: Scene) -> Callable[[], tuple[PlaneIndex, ...]]:
         """Read what the host needs of a scene, which waits for the device; return what then finds the planes."""
@@ -284,13 +284,13 @@ class PlanePreparation:
         ]
         return lambda: tuple(find() for find in each)
 
-    def standing(self, scene: Scene) -> Casters:
-        """Return the casters where they are in a scene."""
-        return with_positions(self.casters, scene.positions)
+    def standing(self, scene: Scene) -> Occluders:
+        """Return the occluders where they are in a scene."""
+        return with_positions(self.occluders, scene.positions)
 
 
 def plane_finder(
-    casters: Casters,
+    occluders: Occluders,
     camera: HostCamera,
     light: Light,
     *,
@@ -312,10 +312,10 @@ def plane_finder(
         ring = cone_ring(axis, float(cosine[0]), cone)
 
     def find() -> PlaneIndex:
-        used = components_in_view(casters, camera, position)
+        used = components_in_view(occluders, camera, position)
         if own is not None:
-            used &= ~casters.of_shape(own)
-        return index_planes(casters, position, camera.origin, used=used, types=types, order=order, ring=ring)
+            used &= ~occluders.of_shape(own)
+        return index_planes(occluders, position, camera.origin, used=used, types=types, order=order, ring=ring)
 
     return find
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How many shadow planes the casters of a scene have, and how many of them this camera needs."""
+"""How many shadow planes the occluders of a scene have, and how many of them this camera needs."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from realtime.methods.shadow_planes.plane_table import light_basis, shadow_plane
 from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from realtime.scene.camera import HostCamera, read_camera
 from realtime.scene.lights import Light, host_position
-from realtime.scene.mesh_adjacency import Casters, read_casters, with_positions
+from realtime.scene.mesh_adjacency import Occluders, read_occluders, with_positions
 from realtime.scene.read_scene import Scene
 
 
@@ -15,14 +15,14 @@ from realtime.scene.read_scene import Scene
 class LightPlan:
     """The shadow planes of one light."""
 
-    edges: int  #: silhouette edges of all casters
+    edges: int  #: silhouette edges of all occluders
     components: int  #: connected components whose shadow can be seen
     planes: int  #: planes of those parts: what a frame works with
 
 
 @dataclass(frozen=True)
-class CasterPlan:
-    """The casters of a scene and, by light, their planes."""
+class OccluderPlan:
+    """The occluders of a scene and, by light, their planes."""
 
     shapes: int
     components: int  #: connected components
@@ -32,25 +32,25 @@ class CasterPlan:
     warnings: tuple[str, ...]  #: what is odd about the meshes, by name
 
 
-def caster_plan(scene: Scene) -> CasterPlan:
-    """Count the casters of a scene and what its camera needs of them.
+def occluder_plan(scene: Scene) -> OccluderPlan:
+    """Count the occluders of a scene and what its camera needs of them.
 
-    Raises InputError for a caster without triangles.
+    Raises InputError for an occluder without triangles.
     """
-    casters = with_positions(read_casters(scene.geometry, scene.area_lights), scene.positions)
+    occluders = with_positions(read_occluders(scene.geometry, scene.area_lights), scene.positions)
     camera = read_camera(scene.camera)
-    lights = tuple(_light_plan(casters, camera, light, scene.source_shape(light)) for light in scene.lights)
-    return CasterPlan(
-        shapes=len(casters.shapes),
-        components=len(casters.closed),
-        closed=int(casters.closed.sum()),
-        triangles=len(casters.triangles),
+    lights = tuple(_light_plan(occluders, camera, light, scene.source_shape(light)) for light in scene.lights)
+    return OccluderPlan(
+        shapes=len(occluders.shapes),
+        components=len(occluders.closed),
+        closed=int(occluders.closed.sum()),
+        triangles=len(occluders.triangles),
         lights=lights,
-        warnings=casters.warnings,
+        warnings=occluders.warnings,
     )
 
 
-def describe_casters(plan: CasterPlan) -> dict[str, str]:
+def describe_occluders(plan: OccluderPlan) -> dict[str, str]:
     """Return the plan in words, one entry for each decision."""
     if not plan.triangles:
         return {"casters": "none: no silhouettes, no planes; one integral a ray and light"}
@@ -66,13 +66,13 @@ def describe_casters(plan: CasterPlan) -> dict[str, str]:
     return words
 
 
-def _light_plan(casters: Casters, camera: HostCamera, light: Light, own: str | None) -> LightPlan:
+def _light_plan(occluders: Occluders, camera: HostCamera, light: Light, own: str | None) -> LightPlan:
     position = host_position(light)
-    used = components_in_view(casters, camera, position)
+    used = components_in_view(occluders, camera, position)
     if own is not None:
-        used &= ~casters.of_shape(own)
-    seen = silhouette(casters, position, used=used)
-    every = len(silhouette(casters, position).edges)
+        used &= ~occluders.of_shape(own)
+    seen = silhouette(occluders, position, used=used)
+    every = len(silhouette(occluders, position).edges)
     return LightPlan(
-        every, int(used.sum()), len(shadow_planes(casters, seen, light_basis(position, camera.origin)).first)
+        every, int(used.sum()), len(shadow_planes(occluders, seen, light_basis(position, camera.origin)).first)
     )

@@ -67,7 +67,7 @@ from realtime.methods.shadow_planes.silhouettes import NEARNESS, Silhouette, is_
 from realtime.numerics.array_types import four_numbers, is_single
 from realtime.numerics.functions import TURN, host_diamond_angle, host_direction
 from realtime.scene.lights import place_and_weight
-from realtime.scene.mesh_adjacency import Casters
+from realtime.scene.mesh_adjacency import Occluders
 
 Array = NDArray[np.float64]
 
@@ -136,9 +136,9 @@ def light_basis(light: Array, camera: Array) -> LightBasis:
     return LightBasis(np.stack([x, np.cross(z, x), z]), distance if w else 1.0, l if w else camera, w)
 
 
-def shadow_planes(casters: Casters, edges: Silhouette, basis: LightBasis) -> Planes:
+def shadow_planes(occluders: Occluders, edges: Silhouette, basis: LightBasis) -> Planes:
     """Return the shadow planes of silhouette edges in the frame of a light and a camera."""
-    return edge_planes(basis.coordinates(casters.vertices[edges.edges]), edges.coefficient, w=basis.w)
+    return edge_planes(basis.coordinates(occluders.vertices[edges.edges]), edges.coefficient, w=basis.w)
 
 
 def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -> Planes:
@@ -249,7 +249,7 @@ def _joined(first: Planes, second: Planes) -> Planes:
     )
 
 
-def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]) -> int:
+def layers_between(occluders: Occluders, light: Array, basis: LightBasis, *, used: NDArray[np.bool_]) -> int:
     """Return how many layers lie between a light and the camera of their basis.
 
     A closed component counts the larger number of its triangles that face the light and that are averted: the two
@@ -266,60 +266,60 @@ def layers_between(casters: Casters, light: Array, basis: LightBasis, *, used: N
         start = camera = basis.origin
         direction, reach = axes[2], (-np.inf, 0.0)
         far = np.where(direction == 0, camera, -np.copysign(np.inf, direction))
-    low, high = casters.boxes[:, 0], casters.boxes[:, 1]
+    low, high = occluders.boxes[:, 0], occluders.boxes[:, 1]
     near = used & np.all((low <= np.maximum(far, camera)) & (high >= np.minimum(far, camera)), axis=1)
     if not near.any():
         return 0
-    number = np.flatnonzero(near[casters.component])
-    number = number[_beside_axis(casters, number, start, axes)]
+    number = np.flatnonzero(near[occluders.component])
+    number = number[_beside_axis(occluders, number, start, axes)]
     if not len(number):
         return 0
-    crossed = number[_crosses(casters, number, (start, direction), reach)]
-    sign = np.sign(casters.normals[crossed] @ l - w * casters.offsets[crossed])
-    component = casters.component[crossed]
-    components = len(casters.closed)
+    crossed = number[_crosses(occluders, number, (start, direction), reach)]
+    sign = np.sign(occluders.normals[crossed] @ l - w * occluders.offsets[crossed])
+    component = occluders.component[crossed]
+    components = len(occluders.closed)
     front, back = (
         np.bincount(component[sign > 0], minlength=components),
         np.bincount(component[sign < 0], minlength=components),
     )
-    return int(np.where(casters.closed, np.maximum(front, back), front + back).sum())
+    return int(np.where(occluders.closed, np.maximum(front, back), front + back).sum())
 
 
-def _beside_axis(casters: Casters, number, start: Array, axes: Array) -> NDArray[np.bool_]:
+def _beside_axis(occluders: Occluders, number, start: Array, axes: Array) -> NDArray[np.bool_]:
     """Return of triangles whether they may meet the axis through `start`: most lie aside of it.
 
     It runs through x = y = 0, and those have all three corners beyond it on one of four sides.
     """
-    x, y = axes[:2] @ casters.vertices.T - (axes[:2] @ start)[:, None]
+    x, y = axes[:2] @ occluders.vertices.T - (axes[:2] @ start)[:, None]
     sides = (x > 0) | (x < 0).view(np.uint8) << 1 | (y > 0).view(np.uint8) << 2 | (y < 0).view(np.uint8) << 3
-    first, second, third = casters.triangles[number].T
+    first, second, third = occluders.triangles[number].T
     return np.asarray(sides[first] & sides[second] & sides[third] == 0)
 
 
-def _crosses(casters: Casters, number, line: tuple[Array, Array], reach: tuple[float, float]) -> NDArray[np.bool_]:
+def _crosses(occluders: Occluders, number, line: tuple[Array, Array], reach: tuple[float, float]) -> NDArray[np.bool_]:
     """Return whether triangles are crossed by start + u direction with u between two bounds, watertight.
 
     The line crosses a triangle if it passes all three edges on the same side. d . (a x b) of an edge is computed from
     its lower vertex number to its higher one, so that both triangles at an edge see the same rounding.
     """
     start, direction = line
-    triangle = casters.triangles[number]
+    triangle = occluders.triangles[number]
     sides = []
     for k in range(3):
         tail, head = triangle[:, k], triangle[:, (k + 1) % 3]
-        low, high = (casters.vertices[end(tail, head)] - start for end in (np.minimum, np.maximum))
+        low, high = (occluders.vertices[end(tail, head)] - start for end in (np.minimum, np.maximum))
         left = np.cross(low, high) @ direction >= 0
         sides.append(np.where(tail < head, left, ~left))
     inside = (sides[0] == sides[1]) & (sides[1] == sides[2])
     # The plane normal . p = offset is met at start + u direction.
-    normal, offset = casters.normals[number], casters.offsets[number]
+    normal, offset = occluders.normals[number], occluders.offsets[number]
     with np.errstate(divide="ignore", invalid="ignore"):
         u = (offset - normal @ start) / (normal @ direction)
     return inside & (u > reach[0]) & (u < reach[1])
 
 
 def index_planes(
-    casters: Casters,
+    occluders: Occluders,
     light: Array,
     camera: Array,
     *,
@@ -330,15 +330,15 @@ def index_planes(
 ) -> PlaneIndex:
     """Find the shadow planes of a light and put them into wedges for a camera.
 
-    `casters`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,) [m];
-    `camera`: position of the camera [m]; `used`: by component, whether its shadow can be seen; `types`: the array types
-    to use, see `realtime.numerics.array_types`; `order`: in which rays go over planes, see `wedge_lists`; `ring`: of a
-    spot whose cone is a caster, see `realtime.methods.shadow_planes.silhouettes.cone_ring`.
+    `occluders`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,)
+    [m]; `camera`: position of the camera [m]; `used`: by component, whether its shadow can be seen; `types`: the array
+    types to use, see `realtime.numerics.array_types`; `order`: in which rays go over planes, see `wedge_lists`; `ring`:
+    of a spot whose cone is an occluder, see `realtime.methods.shadow_planes.silhouettes.cone_ring`.
     """
     basis = light_basis(light, camera)
     axes = basis.axes
-    layers = layers_between(casters, light, basis, used=used)
-    planes = shadow_planes(casters, silhouette(casters, light, used=used), basis)
+    layers = layers_between(occluders, light, basis, used=used)
+    planes = shadow_planes(occluders, silhouette(occluders, light, used=used), basis)
     if ring is not None:
         edges = NEARNESS * basis.distance * ring_edges(ring) @ axes.T
         planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int8)))

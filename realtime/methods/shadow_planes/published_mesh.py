@@ -12,7 +12,7 @@ Near the light Gamma falls as 1/u. Interpolated linearly between u and ratio u i
 ratio) - 1, 4 % for 1.5, at whatever distance: this is why rows at equal ratios are wise. The planes of a cone begin
 NEARNESS of the camera's distance from the light (`realtime.methods.shadow_planes.silhouettes`); by the same ratio they
 need log(1/NEARNESS)/log(ratio) rows, 35, to come as far as the camera, and have so many more than the planes of
-casters.
+occluders.
 
 Beyond the last row Gamma keeps its value there. Surfaces interpolate Gamma between the vertices of their triangles
 (5.1.3).
@@ -49,17 +49,17 @@ def gamma_at(view: View, light: Light, point, *, kernel):
 def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone: bool = False):
     """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes.
 
-    `index`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of casters; `cone`: whether
+    `index`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of occluders; `cone`: whether
     planes of a cone are among them.
     """
     further = math.ceil(-math.log(NEARNESS) / math.log(RATIO)) if cone else 0
-    casters_rows, rows = rows, rows + further
+    occluders_rows, rows = rows, rows + further
     Float, Vector = type(index.distance), type(light.position)
     planes = dr.width(index.ends) // 6
     lane = dr.arange(mi.UInt32, planes * 2 * rows)
     row, end = lane % rows, lane // rows
     if further:
-        row = dr.minimum(row, _last_row(index, end // 2, casters_rows, rows))
+        row = dr.minimum(row, _last_row(index, end // 2, occluders_rows, rows))
     corner = Vector(*(dr.gather(Float, index.ends, end * 3 + k) for k in range(3))) * RATIO ** Float(row)
     x_axis, y_axis, z_axis = (Vector(axis) for axis in index.axes)
     point = light.position + x_axis * corner.x + y_axis * corner.y + z_axis * corner.z
@@ -76,7 +76,7 @@ def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone
         p, q = dr.maximum(p, 0), dr.maximum(q, 0)
         u = dr.clip(p + q, 1, RATIO ** (rows - 1))
         if further:
-            u = dr.minimum(u, RATIO ** Float(_last_row(index, number, casters_rows, rows)))
+            u = dr.minimum(u, RATIO ** Float(_last_row(index, number, occluders_rows, rows)))
         t = dr.clip(q / dr.maximum(p + q, 1e-30), 0, 1)
         cell = dr.minimum(mi.UInt32(dr.log(u) * (1 / math.log(RATIO))), rows - 2)
         near = RATIO ** Float(cell)
@@ -96,7 +96,7 @@ def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone
 
 
 def _last_row(index: PlaneIndex, plane, rows: int, rows_of_cone: int):
-    """Return the last row of planes: those of a cone begin where no caster is."""
+    """Return the last row of planes: those of a cone begin where no occluder is."""
     Float = type(index.distance)
     first = [dr.gather(Float, index.ends, plane * 6 + k) for k in range(3)]
     of_cone = sum(dr.square(part) for part in first) < dr.square(10 * NEARNESS * index.distance)

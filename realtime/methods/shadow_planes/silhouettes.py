@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 
 from realtime.scene.camera import HostCamera
 from realtime.scene.lights import place_and_weight
-from realtime.scene.mesh_adjacency import Casters
+from realtime.scene.mesh_adjacency import Occluders
 
 Array = NDArray[np.float64]
 
@@ -60,42 +60,42 @@ class Silhouette:
     coefficient: NDArray[np.int8]  #: layers to the left of the edge, as the light sees it, less those to its right
 
 
-def facing(casters: Casters, light: Array) -> NDArray[np.int8]:
+def facing(occluders: Occluders, light: Array) -> NDArray[np.int8]:
     """Return by triangle whether its front faces a light: 1 yes, -1 no, 0 edge-on; and a last 0 for no triangle."""
     l, w = place_and_weight(np.asarray(light, dtype=np.float64))  # noqa: E741
-    return np.append(np.sign(casters.normals @ l - w * casters.offsets), 0).astype(np.int8)
+    return np.append(np.sign(occluders.normals @ l - w * occluders.offsets), 0).astype(np.int8)
 
 
-def layers(casters: Casters, light: Array) -> NDArray[np.int8]:
+def layers(occluders: Occluders, light: Array) -> NDArray[np.int8]:
     """Return the number of layers that each triangle stands for, (triangles + 1,), with a last 0 for no triangle.
 
     `light` is a homogeneous position, (4,), or a place, (3,) [m].
     """
-    sign = facing(casters, light)
-    if casters.closed.all():
+    sign = facing(occluders, light)
+    if occluders.closed.all():
         return np.maximum(sign, 0)
-    is_open = np.append(~casters.closed[casters.component], False)
+    is_open = np.append(~occluders.closed[occluders.component], False)
     return np.where(is_open, sign, np.maximum(sign, 0))
 
 
-def silhouette(casters: Casters, light: Array, *, used: NDArray[np.bool_] | None = None) -> Silhouette:
+def silhouette(occluders: Occluders, light: Array, *, used: NDArray[np.bool_] | None = None) -> Silhouette:
     """Find the silhouette edges.
 
-    `casters`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,) [m];
-    `used`: by component, which ones to look at; all by default.
+    `occluders`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,)
+    [m]; `used`: by component, which ones to look at; all by default.
 
-    Valid for closed, open and non-manifold meshes, either winding, and a light inside a caster (which has then no
+    Valid for closed, open and non-manifold meshes, either winding, and a light inside an occluder (which has then no
     silhouette: all outside is dark, see `realtime.methods.shadow_planes.plane_table.layers_between`).
     """
-    weight = layers(casters, light)
+    weight = layers(occluders, light)
     if used is not None and not used.all():
-        weight[:-1][~used[casters.component]] = 0
-    right = weight[casters.right]
-    if casters.same_way.any():
-        right = np.where(casters.same_way, -right, right)
-    coefficient = weight[casters.left] - right
+        weight[:-1][~used[occluders.component]] = 0
+    right = weight[occluders.right]
+    if occluders.same_way.any():
+        right = np.where(occluders.same_way, -right, right)
+    coefficient = weight[occluders.left] - right
     on_silhouette = np.flatnonzero(coefficient)
-    return Silhouette(casters.edges[on_silhouette], coefficient[on_silhouette])
+    return Silhouette(occluders.edges[on_silhouette], coefficient[on_silhouette])
 
 
 def cone_ring(axis: Array, cos_cutoff: float, sides: int) -> Array:
@@ -124,12 +124,12 @@ def is_outside(ring: Array, direction: Array) -> bool:
     return bool(np.any(normals @ direction > 0))
 
 
-def components_in_view(casters: Casters, camera: HostCamera, light: Array) -> NDArray[np.bool_]:
+def components_in_view(occluders: Occluders, camera: HostCamera, light: Array) -> NDArray[np.bool_]:
     """Return by component whether its shadow can be seen; `light` is a homogeneous position, (4,), or a place, (3,)."""
     l, w = place_and_weight(light)  # noqa: E741
     origin, normals = view_planes(camera)
     choose = np.array([[i >> k & 1 for k in range(3)] for i in range(8)])
-    corners = casters.boxes[:, choose, np.arange(3)]
+    corners = occluders.boxes[:, choose, np.arange(3)]
     near = (corners - origin) @ normals.T
     far = (w * corners - l) @ normals.T
     outside = np.all(near < 0, axis=1) & np.all(far <= 0, axis=1)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The airlight of a source along rays, by the midpoint rule with one visibility test a step and light point.
+r"""The airlight of a source along rays, by the midpoint rule with one visibility test a step and light sample.
 
-Of a light with extent N points lie in a table. In the orthonormal frame of a point, with its normal for the third axis,
+Of an area light N points lie in a table. In the orthonormal frame of a point, with its normal for the third axis,
 a ray is o + x d, and all that an integrand needs follows from its three coordinates (a, b, c) at x:
 
     r^2 = a^2 + b^2 + c^2,    cos_l = c / r,    cos_scatter = -(o . d + x) / r,
@@ -23,7 +23,7 @@ from realtime.methods.interface.method import View
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.array_types import aligned_array
 from realtime.numerics.functions import summed
-from realtime.scene.light_points import LightFrame, frame_at, light_frames
+from realtime.scene.light_samples import LightFrame, frame_at, light_frames
 from realtime.scene.lights import Light
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
@@ -33,7 +33,7 @@ from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 class SourceState:
     """What is made of one source when lights or shapes move."""
 
-    frames: LightFrame | None  #: the points of a light with extent, one a lane
+    frames: LightFrame | None  #: the points of an area light, one a lane
     width: Any  #: of that light, of a square with its mean square extent [m]
     flat: bool  #: whether all points of that light face the same way
     maps: HemisphereMaps | ShadowMap | None  #: None where nobody asks them
@@ -60,16 +60,16 @@ def source_state(
 
 @dataclass(frozen=True)
 class Share:
-    """What of a light with extent each ray takes: one point, with a shift of its steps."""
+    """What of an area light each ray takes: one point, with a shift of its steps."""
 
-    number: Any  #: of the light point
+    number: Any  #: of the light sample
     shift: Any  #: of the steps, from 0 to 1 of one
 
 
 def integral_of_points(
     view: View, state: SourceState, points: int, share: Share | None, p: SoftShaftsParameters
 ) -> Any:
-    """Return the sum of the airlight integrals of the points of a light with extent [1/m].
+    """Return the sum of the airlight integrals of the points of an area light [1/m].
 
     `view`: the rays, in one medium without bounds; `state`: the light, with its maps if `shadow=map`; `points`: how
     many points it has; `share`: one point for each ray, counted `points` times; None for all; `p`: the parameters.
@@ -88,7 +88,7 @@ def _of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftSh
     origin, direction = frame.local(view.origin - frame.position), frame.local(view.direction)
     along = sum(o * d for o, d in zip(origin, direction))
     begin, end = medium.part(view, Float(0), view.distance, uniform=p.spacing == "uniform")
-    # The plane of the light point cuts the ray.
+    # The plane of the light sample cuts the ray.
     meets = -origin[2] / direction[2]
     begin = dr.select(direction[2] > 0, dr.maximum(meets, begin), begin)
     end = dr.select(direction[2] < 0, dr.minimum(meets, end), end)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Soft shafts: airlight and surfaces under lights with extent, from few light points and filters.
+"""Soft shafts: airlight and surfaces under area lights, from few light samples and filters.
 
 Ali 2016 takes 3 or 5 points of a light, a shadow map for each, the mean of their visibilities in N + 1 levels, few
 steps along each ray, and a bilateral filter of what comes out (its SBFS and SoftBiF-VS); its realTiSoftLS computes
@@ -8,7 +8,7 @@ Fig. 4.9.
 
 The stages of a frame:
 
-1. `prepare`: a table of the light points, and their maps.
+1. `prepare`: a table of the light samples, and their maps.
 2. Airlight of every `scale`-th pixel by `steps` steps for each point (`march.py`), a number per ray and light.
 3. The bilateral filter, on log(1 + L / mean L), and joint up-sampling with a depth test.
 4. The share of each light that reaches each pixel's surface (`surfaces.py`), and its filter, before anything is shaded.
@@ -57,14 +57,14 @@ from realtime.methods.soft_shafts.surfaces import (
     reached_surfaces,
 )
 from realtime.numerics.array_types import two_numbers
-from realtime.scene.light_points import frame_at
+from realtime.scene.light_samples import frame_at
 from realtime.scene.lights import sources_of
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
 from realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
 
 _MOST_AUTO = 8.0  # the widest filter of hd=auto [pixels]
 _LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5  # its narrowest, and that where pixels share the points [pixels]
-_GROUP = 4  # how many light points a pixel of a narrow penumbra asks
+_GROUP = 4  # how many light samples a pixel of a narrow penumbra asks
 
 
 @dataclass(frozen=True)
@@ -271,7 +271,7 @@ class _Frame:
         return state.maps.lit_surface(mi.UInt32(place), local)
 
     def _share(self, raster: Raster, lights: list[Any]) -> Share:
-        """Return which light point each pixel takes, and how far its steps are shifted."""
+        """Return which light sample each pixel takes, and how far its steps are shifted."""
         column, row = raster.places()
         # The order of ordered dithering (Bayer 1973): pixels side by side are far apart in it, and so are their points.
         other = column ^ row

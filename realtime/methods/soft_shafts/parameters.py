@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.area_lights.points import LightPoints
+from realtime.area_lights.points import LightSamples
 from realtime.errors import InputError
 from realtime.methods.interface.method import Method
 from realtime.parameters import parameter
@@ -51,12 +51,12 @@ class SoftShaftsParameters(Method):
     casts_rays = True
     provides_visibility = True
     at_once = True
-    light_points = LightPoints(5, "ring")
+    light_samples = LightSamples(5, "ring")
 
-    steps: int = parameter(32, "steps of every ray and light point", least=1)
+    steps: int = parameter(32, "steps of every ray and light sample", least=1)
     spacing: str = parameter(
         "uniform",
-        "of the steps: in the distance, or in the angle at the light point",
+        "of the steps: in the distance, or in the angle at the light sample",
         choices=("uniform", "equiangular"),
     )
     shadow: str = parameter(
@@ -65,16 +65,16 @@ class SoftShaftsParameters(Method):
     surfaces: str = parameter(
         "map", "visibility of surfaces: by look-ups in the maps, or by a shadow ray", choices=("map", "ray")
     )
-    map: int = map_size(512, "texels on a side of the map of every light point")
+    map: int = map_size(512, "texels on a side of the map of every light sample")
     scale: int = parameter(
         1, "airlight is computed in one pixel of so many, in rows and columns, and interpolated", choices=(1, 2, 4, 8)
     )
     interleave: bool = parameter(
-        False, "each pixel of a tile of 4 x 4 takes one of the light points and a shift of the steps of its own"
+        False, "each pixel of a tile of 4 x 4 takes one of the light samples and a shift of the steps of its own"
     )
     narrow: float = parameter(
         0.0,
-        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks four light points",
+        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks four light samples",
         least=0,
         unit="pixels",
     )

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which share of a light with extent reaches the visible surfaces, and how wide its penumbrae are there.
+"""Which share of an area light reaches the visible surfaces, and how wide its penumbrae are there.
 
-The mean over N light points has N + 1 levels. Points of a sphere face different ways: there each counts with its cosine
-at the light over the square of its distance, as it counts in the irradiance.
+The mean over N light samples has N + 1 levels. Points of a sphere face different ways: there each counts with its
+cosine at the light over the square of its distance, as it counts in the irradiance.
 
 The width of a penumbra follows from similar triangles (Fernando 2005, PCSS): of a light of the width L, an edge at the
 distance d_b and a surface at d_r from it,
 
     w = L (d_r - d_b) / d_b,
 
-with d_b what a map holds in the direction of the surface, where that is nearer than it. Over the light points and the
+with d_b what a map holds in the direction of the surface, where that is nearer than it. Over the light samples and the
 neighbours of a pixel the geometric mean of w is taken: where edges at several distances shadow a pixel, the narrow
 penumbrae count, which a wide filter would smear. Widths change slowly, so that they are looked for in few pixels.
 """
@@ -27,7 +27,7 @@ from realtime.methods.soft_shafts.march import SourceState
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.camera import Camera
-from realtime.scene.light_points import frame_at
+from realtime.scene.light_samples import frame_at
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
 #: c of hd = c w / N: what smooths the staircase of N levels best (`tests/.../test_auto_width.py` fits it again).
@@ -43,7 +43,7 @@ _NEARER = 0.01  # what is this much nearer to the light than a surface, of its o
 class Reached:
     """What of a light reaches the visible surfaces, row by row."""
 
-    lit: Any  #: sum of the weights of the light points that reach them
+    lit: Any  #: sum of the weights of the light samples that reach them
     all: Any  #: sum of all weights
 
     @property
@@ -60,9 +60,9 @@ def reached_surfaces(
     p: SoftShaftsParameters,
     asked: Any = True,
 ) -> Reached:
-    """Return what of a light with extent reaches the surfaces of a view, where they are `asked` for; others return 0.
+    """Return what of an area light reaches the surfaces of a view, where they are `asked` for; others return 0.
 
-    `view`: the rays, row by row; `state`: the light; `number_of`, `count`: which light point each ray asks first,
+    `view`: the rays, row by row; `state`: the light; `number_of`, `count`: which light sample each ray asks first,
     second and so on, counted from 0, and how many; `p`: the parameters.
     """
     Float = type(view.distance)
@@ -85,7 +85,7 @@ def reached_surfaces(
 
 
 def _of_point(view: View, state: SourceState, place: Any, there: Any, number: Any, p: SoftShaftsParameters) -> Any:
-    """Return what one light point adds to each sum of `Reached`."""
+    """Return what one light sample adds to each sum of `Reached`."""
     Float = type(view.distance)
     frame = frame_at(state.frames, number)
     a, b, c = frame.local(place - frame.position)
@@ -103,7 +103,7 @@ def _of_point(view: View, state: SourceState, place: Any, there: Any, number: An
 
 
 def share_is_plain(p: SoftShaftsParameters) -> bool:
-    """Return whether every light point counts alike, so that the share has N + 1 levels."""
+    """Return whether every light sample counts alike, so that the share has N + 1 levels."""
     return not p.interleave
 
 
@@ -138,7 +138,7 @@ def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, ras
 
 
 def blockers_of(view: View, state: SourceState, count: int) -> Any:
-    """Return the sum of log((d_r - d_b) / d_b) over the light points that something blocks, and how many these are.
+    """Return the sum of log((d_r - d_b) / d_b) over the light samples that something blocks, and how many these are.
 
     `view`: rays to surfaces; `state`, `count`: the light, with its maps, and how many points it has.
     """

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounded media: homogeneous, convex and disjoint, in clear air or in a homogeneous medium around them.
+"""Bounded media: homogeneous, convex and disjoint, in vacuum or in a homogeneous medium around them.
 
 A ray enters and leaves each of them once. What its segments cross follows from these two distances, found once a ray
 (`crossed`), and what the path to a light crosses from `realtime.scene.media.light_paths`; an optical depth is
 
-    tau = sigma_0 length + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in clear air.
+    tau = sigma_0 length + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in vacuum.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ from realtime.scene.phase import Phase
 
 @dataclass(frozen=True)
 class Clouds:
-    """Media within closed bounds of any shape, disjoint, in clear air: tables with an entry for each."""
+    """Media within closed bounds of any shape, disjoint, in vacuum: tables with an entry for each."""
 
     sigma_t: tuple[Any, ...]  #: extinction [1/m], by channel; the largest of a cloud with a density
     albedo: Any  #: single-scattering albedos, RGB [1]
@@ -35,7 +35,7 @@ class Clouds:
 
 @dataclass(frozen=True)
 class BoundedMedia(Homogeneous):
-    """A homogeneous medium or clear air with bounded media in it. They have as many extinctions as it has."""
+    """A homogeneous medium or vacuum with bounded media in it. They have as many extinctions as it has."""
 
     bounded_media: tuple[BoundedMedium, ...] = ()
     clear: bool = False
@@ -63,7 +63,7 @@ class BoundedMedia(Homogeneous):
         return tuple(depths)
 
     def last_depth(self, origin, forward):
-        """Return the depth at which the last medium in clear air ends [m]."""
+        """Return the depth at which the last medium in vacuum ends [m]."""
         if not self.clear:
             return None
         depths = [dr.dot(own.centre - origin, forward) + own.radius for own in self.bounded_media]
@@ -110,10 +110,10 @@ class BoundedMedia(Homogeneous):
         return 1
 
     def part(self, rays, x0, x1, *, uniform):
-        """Return the part of a segment [m] from the first to the last bounded medium, in clear air."""
+        """Return the part of a segment [m] from the first to the last bounded medium, in vacuum."""
         if not self.clear:
             return super().part(rays, x0, x1, uniform=uniform)
-        # An endless ray that meets none would begin at infinity, where a map has no place and a step no length.
+        # An unbounded ray that meets none would begin at infinity, where a map has no place and a step no length.
         first, last = x1, x0
         for enter, leave in rays.crossed:
             first = dr.minimum(first, enter)
@@ -160,7 +160,7 @@ class BoundedMedia(Homogeneous):
             form = "exact" if polynomial is None or not light.w else "paper"
             if form != "exact" and not self.clear:
                 raise InputError(
-                    "kernel: got a polynomial, which has each medium in clear air; wanted clear air around the bounded "
+                    "kernel: got a polynomial, which has each medium in vacuum; wanted vacuum around the bounded "
                     "media, or another kernel"
                 )
         else:

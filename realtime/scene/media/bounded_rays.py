@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Airlight in bounded media: homogeneous, convex and disjoint, in clear air or in another medium.
+"""Airlight in bounded media: homogeneous, convex and disjoint, in vacuum or in another medium.
 
 A ray runs through *pieces*, the bounded media that it meets and, where the air is not clear, the gaps between them. In
 a piece of the medium j, over a lit segment of it,
@@ -10,7 +10,7 @@ without r of a light at infinity, with the true optical depths on both paths. Ca
 enters the piece is one number a ray, then sigma_j (x - x_j). Light: the path from the light to x has the length l_k in
 the medium k (`realtime.scene.media.light_paths`), and
 
-    tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in clear air.
+    tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in vacuum.
 
 Between two *bends*, where a path passes from facet to facet, or an edge, or grazes a sphere, or where the intensity of
 a spot begins to fall, all of this is smooth. A panel ends at a bend, and sooner where it would
@@ -42,7 +42,7 @@ x - x_n + R with x = t + h tan theta gives
 That is ``media=paper``. ``media=printed`` is the first equation with t for the r before the integral, which alone can
 be meant, and the exponent within it as it stands. A kernel may have a polynomial for either
 (`realtime.scene.media.published_form`); without one they are summed over panels. The paper has each medium alone: the
-light reaches a body through clear air, however many bodies are before it. What is before the body on the camera's side
+light reaches a body through vacuum, however many bodies are before it. What is before the body on the camera's side
 is one factor for a ray, and is kept.
 
 References
@@ -161,7 +161,7 @@ def check_form(medium: Medium, form: str, light: Light) -> None:
     if form not in FORMS:
         raise InputError(f"media: got {form!r}, wanted one of {', '.join(FORMS)}")
     if form != "exact" and medium.bounded_media and not medium.clear:
-        raise InputError(f"media={form}: wanted clear air around the bounded media; use media=exact")
+        raise InputError(f"media={form}: wanted vacuum around the bounded media; use media=exact")
     if not light.w and form != "exact":
         raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
 

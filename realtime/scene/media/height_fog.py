@@ -50,7 +50,7 @@ _NODES, _NODES_DOUBLE = 12, 28
 _WIDTH, _SCALE_HEIGHTS, _DEPTH = 4.2, 10.0, 12.0  # of a panel at most: in ln E, of rise, of optical depth
 _WIDTH_ASKED = 6.0  # in ln E of panels with a number of nodes that was asked for
 _MOST = 200  # panels of a segment: no segment needs as many
-_ENDLESS = 1e9  # [m]
+_UNBOUNDED = 1e9  # [m]
 _LEVEL = 1e-20  # the rise of a ray, and a difference of heights [m], that stand for none
 
 
@@ -82,7 +82,7 @@ class HeightFog(VaryingMedium):
         ends = [(z - start) / rise for z in (self.floor, self.cap)]
         level, inside = rise == 0, (start >= self.floor) & (start <= self.cap)
         enter = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
-        leave = dr.select(level, dr.select(inside, _ENDLESS, 0), dr.clip(dr.maximum(*ends), 0, _ENDLESS))
+        leave = dr.select(level, dr.select(inside, _UNBOUNDED, 0), dr.clip(dr.maximum(*ends), 0, _UNBOUNDED))
         crossed = (dr.minimum(enter, leave), leave), (start, rise)
         return replace(super().rays(origin, direction, aim), crossed=crossed)
 

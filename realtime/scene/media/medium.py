@@ -48,7 +48,7 @@ class Medium(ABC):
     phase: Any  #: the phase function
     clear = False  #: whether nothing scatters or absorbs but bounded media
     bounded_media: tuple[Any, ...] = ()  #: those in it
-    clouds: Any = None  #: in clear air: all bounded media, of any shape, for methods that render clouds
+    clouds: Any = None  #: in vacuum: all bounded media, of any shape, for methods that render clouds
 
     @property
     @abstractmethod

@@ -30,7 +30,7 @@ def set_layers(sets: Sequence[str]) -> tuple[str, ...]:
     """Return the layers of a batch: all orders, light that met a surface, sets of orders such as '3-4', and `straight`.
 
     `surface_straight` is the part of `surface` that went from the lights to the visible surface and from there to the
-    eye, dimmed by clouds but not scattered.
+    eye, attenuated by clouds but not scattered.
     """
     return ("airlight", "surface", *(set_layer(name) for name in sets), "surface_straight")
 

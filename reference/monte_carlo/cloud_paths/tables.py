@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A scene of clouds as arrays that the walk gathers from: media by number, suns, phase functions.
 
-Medium 0 is clear air, and as the kind of a shape it means an opaque one; the clouds count from 1.
+Medium 0 is vacuum, and as the kind of a shape it means an opaque one; the clouds count from 1.
 """
 
 from dataclasses import dataclass

@@ -21,7 +21,7 @@ surfaces, the path goes on with a probability in proportion (Russian roulette, u
 cloud with less than 1/8 of its light likewise goes on with 8 times that share as its probability.
 
 In which medium a stretch lies follows from its end: before a face of a cloud seen from inside, the cloud; before one
-seen from outside, or nothing, clear air; before an opaque surface, where the path was last. So a crossing that rounding
+seen from outside, or nothing, vacuum; before an opaque surface, where the path was last. So a crossing that rounding
 doubles or hides mends itself at the next face. After a crossing a ray starts a little further on, which is added to the
 length of its next stretch.
 

@@ -8,7 +8,7 @@ Read in this order:
 - `stretches.py`: camera rays, their parts in media, cells of samples;
 - `height_fog.py`: parts in height fog, with optical depths of its own;
 - `density_grid.py`: parts in density grids, by ratio tracking;
-- `area_sampling.py`: lights with extent, and points on them;
+- `area_sampling.py`: area lights, and points on them;
 - `sources.py`: what samples receive of lights;
 - `scene_data.py`: what the integrator must know of a scene, read on its own;
 - `estimator.py`: the estimate of one camera ray;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Sampling points on lights with extent, in Dr.Jit: evenly over the area, and towards the ray.
+r"""Sampling points on area lights, in Dr.Jit: evenly over the area, and towards the ray.
 
 For one point y of a light, the distances along a camera ray come from
 `reference.monte_carlo.single_scatter.distance_sampling`, as for a lamp at y. What such a sample is worth is bounded by
@@ -48,7 +48,7 @@ _SHEAR = 1e-5  # relative: a transform in float32 rounds to 1e-6
 
 @dataclass(frozen=True)
 class AreaLight:
-    """A light with extent as sampling must know it; vectors of double precision."""
+    """An area light as sampling must know it; vectors of double precision."""
 
     shape: str  #: of `SHAPES`, or 'Mesh'
     centre: Any  #: [m]
@@ -99,7 +99,7 @@ class _Mesh:
 
 
 @dataclass(frozen=True)
-class LightPoint:
+class LightSample:
     """Points on a light, of double precision."""
 
     position: Any  #: [m]
@@ -108,12 +108,12 @@ class LightPoint:
 
 
 def is_area(emitter) -> bool:
-    """Return whether an emitter of Mitsuba is a light with extent."""
+    """Return whether an emitter of Mitsuba is an area light."""
     return str(emitter.class_name()) == "AreaLight"
 
 
 def read_area(emitter) -> AreaLight:
-    """Read a light with extent from Mitsuba: its shape from the transform, which side shines by asking for a normal.
+    """Read an area light from Mitsuba: its shape from the transform, which side shines by asking for a normal.
 
     Raises InputError for a shape other than a rectangle, a disk or a sphere, for a sheared one, and for a radiance that
     varies.
@@ -189,7 +189,7 @@ def _read_mesh(shape, name: str) -> _Mesh:
     return _Mesh(scene, one, two, three, len(areas), float(areas.sum()))
 
 
-def sample_point(u, v, light: AreaLight, *, origin, direction) -> LightPoint:
+def sample_point(u, v, light: AreaLight, *, origin, direction) -> LightSample:
     """Sample points on a light for camera rays.
 
     `u`, `v`: uniform in [0, 1); `light`: the light; `origin`, `direction`: the rays, of double precision.
@@ -202,18 +202,18 @@ def sample_point(u, v, light: AreaLight, *, origin, direction) -> LightPoint:
     return (_on_sphere if light.shape == "Sphere" else _on_plane)(u, v, light, origin, direction)
 
 
-def sample_evenly(u, v, light: AreaLight) -> LightPoint:
+def sample_evenly(u, v, light: AreaLight) -> LightSample:
     """Sample points evenly over the area of a light, for u and v uniform in [0, 1)."""
     u, v = mi.Float64(u), mi.Float64(v)
     density = mi.Float64(1 / light.area)
     if light.mesh is not None:
         number, u = light.mesh.choose(u)
-        return LightPoint(_even_in_triangle(u, v, light.mesh, number), light.mesh.normal(number), density)
+        return LightSample(_even_in_triangle(u, v, light.mesh, number), light.mesh.normal(number), density)
     if light.shape == "Sphere":
         normal = _towards(1 - 2 * v, 2 * math.pi * u, mi.Vector3d(0, 0, 1))
-        return LightPoint(light.centre + light.reach[0] * normal, normal, density)
+        return LightSample(light.centre + light.reach[0] * normal, normal, density)
     x, y = _even_in_plane(u, v, light)
-    return LightPoint(light.centre + light.across * x + light.up * y, light.normal, density)
+    return LightSample(light.centre + light.across * x + light.up * y, light.normal, density)
 
 
 def _even_in_plane(u, v, light: AreaLight) -> tuple[Any, Any]:
@@ -224,7 +224,7 @@ def _even_in_plane(u, v, light: AreaLight) -> tuple[Any, Any]:
     return a * dr.sqrt(v) * cosine, b * dr.sqrt(v) * sine
 
 
-def _on_plane(u, v, light: AreaLight, origin, direction) -> LightPoint:
+def _on_plane(u, v, light: AreaLight, origin, direction) -> LightSample:
     """Sample points evenly and about the place where the ray meets the plane, moved onto the light."""
     a, b = light.reach
     slope = dr.dot(direction, light.normal)
@@ -253,7 +253,7 @@ def _on_plane(u, v, light: AreaLight, origin, direction) -> LightPoint:
     # What rounding puts a little beyond the edge is at the edge.
     density = (1 - share) / light.area + share / (2 * math.pi * dr.maximum(edge, rho) * rho)
     density = dr.select(counts, density, 0)
-    return LightPoint(light.centre + light.across * x + light.up * y, light.normal, density)
+    return LightSample(light.centre + light.across * x + light.up * y, light.normal, density)
 
 
 def _even_in_triangle(u, v, mesh: _Mesh, number):
@@ -261,7 +261,7 @@ def _even_in_triangle(u, v, mesh: _Mesh, number):
     return mesh.corner(number, 0) + mesh.corner(number, 1) * (root * (1 - v)) + mesh.corner(number, 2) * (root * v)
 
 
-def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightPoint:
+def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightSample:
     """Sample points evenly, and half of those of a ray that meets the mesh about the place where it does."""
     hit = mesh.scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)))
     meets = hit.is_valid()
@@ -292,7 +292,7 @@ def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightPoint:
     edge = _edge_of_triangle(place, way / rho, ends, normal)
     pdf = (1 - share) / mesh.area
     pdf += dr.select(here, share / (2 * math.pi * dr.maximum(edge, rho) * rho), 0)
-    return LightPoint(position, mesh.normal(number), dr.select(counts, pdf, 0))
+    return LightSample(position, mesh.normal(number), dr.select(counts, pdf, 0))
 
 
 def _edge_of_triangle(place, towards, ends, normal):
@@ -325,7 +325,7 @@ def _edge(x0, y0, cosine, sine, light: AreaLight):
     return dr.maximum(dr.minimum(sideways, upwards), 0)
 
 
-def _on_sphere(u, v, light: AreaLight, origin, direction) -> LightPoint:
+def _on_sphere(u, v, light: AreaLight, origin, direction) -> LightSample:
     """Sample points on the side that is turned to the ray, and about the two places where the ray meets the sphere."""
     radius = light.reach[0]
     offset = origin - light.centre
@@ -348,7 +348,7 @@ def _on_sphere(u, v, light: AreaLight, origin, direction) -> LightPoint:
     for place in places:
         chord = dr.maximum(radius * dr.norm(normal - place), _LEAST)
         density = density + 0.5 * share / (4 * math.pi * radius * chord)
-    return LightPoint(light.centre + normal * radius, normal, density)
+    return LightSample(light.centre + normal * radius, normal, density)
 
 
 def _towards(cosine, angle, axis):

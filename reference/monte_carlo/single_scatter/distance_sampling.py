@@ -50,7 +50,7 @@ _MEAN_FREE_PATHS = 60.0  # free flights are cut there: 1e-26 of them are longer,
 # By how much samples may fall beside a spot's cone [rad]: above double precision's rounding, and so little that it does
 # not matter that hardly any sample ever does. (A strip that 1 batch in 100 feels is a bias in all the others.)
 _CONE_MARGIN = 1e-8
-_FAR = 1e30  # where a sample at the very end of an endless ray goes; nothing is transmitted from there [m]
+_FAR = 1e30  # where a sample at the very end of an unbounded ray goes; nothing is transmitted from there [m]
 _CDF_TOLERANCE = 3e-8  # how exactly the mixture is inverted: a rounding of what samplers draw
 _STEPS = 60  # most take five; every fourth halves the bracket
 _LEAST_DEPTH = 1e-12  # the exponential of a thinner span is uniform to the last bit
@@ -139,7 +139,7 @@ def _distance(angle, span: Span):
     """Return how far from the start of the span the point is that the light sees at an angle from it [m]."""
     s0, h = span.start, span.height
     sine, cosine = dr.sincos(angle)
-    beyond = h * cosine - s0 * sine  # r0 cos(theta): above 0, and 0 at the far end of an endless ray
+    beyond = h * cosine - s0 * sine  # r0 cos(theta): above 0, and 0 at the far end of an unbounded ray
     y = (h * h + s0 * s0) * sine / dr.maximum(beyond, 1e-30)
     return dr.minimum(dr.select(beyond > 0, y, _FAR), span.length)
 

@@ -6,7 +6,7 @@ For each light and each medium that a ray crosses, from x0 to x1,
     L = int_{x0}^{x1} T(0, x) sigma_s p(cos)/(4 pi) E V T(x, light) dx
 
 (T transmittance, V visibility) is estimated at distances that the medium draws. E is what a light sends to the point,
-I/r^2 of a light at a place, the irradiance of one from infinity. Lights with extent and a sky are integrals over their
+I/r^2 of a light at a place, the irradiance of one from infinity. Area lights and a sky are integrals over their
 points and directions: each sample has one of its own, from a Kronecker sequence with a random start. A surface at the
 end of the ray adds f cos E V T T, where the light needs it the mean over samples. The lights are those of
 `reference.monte_carlo.single_scatter.sources`, transmittances the answers of the medium

@@ -31,8 +31,8 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
     """Trace one batch along the pixel-centre rays, from the pinhole.
 
     `reference`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: distances sampled for
-    each ray, light and medium, each from a point of its own of a light with extent, at most 256. Returns Batches:
-    airlight and surface of every pixel [W/(m^2 sr)]. The surface is sampled under lights with extent and a sky
+    each ray, light and medium, each from a point of its own of an area light, at most 256. Returns Batches:
+    airlight and surface of every pixel [W/(m^2 sr)]. The surface is sampled under area lights and a sky
     alone: without these all batches agree on it.
     """
     check_samples(samples)

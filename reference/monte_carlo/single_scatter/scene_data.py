@@ -53,12 +53,12 @@ def read_task(scene, medium, samples: int) -> Task:
         media = [*media, medium]
     far = [source.emitter for source in sources if isinstance(source, FarSource)]
     if far:
-        _refuse_endless(scene, medium, far[0])
+        _refuse_unbounded(scene, medium, far[0])
     known = medium is None or isinstance(medium, mi.Medium)
     return Task(around, sources, samples, grey=known and all(_is_grey(each) for each in media))
 
 
-def _refuse_endless(scene, medium, emitter) -> None:
+def _refuse_unbounded(scene, medium, emitter) -> None:
     """Refuse a medium without bounds: what camera rays start in where nothing bounds it, or the exterior of a bound."""
     inside = [shape.interior_medium() for shape in scene.shapes()]
     around = [shape.exterior_medium() for shape in scene.shapes()]

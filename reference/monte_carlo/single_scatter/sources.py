@@ -2,11 +2,11 @@
 r"""Lights as the estimator asks them: what one sample on a camera ray, or one on a surface, receives.
 
 A light at a place sends the intensity I to a point at the distance r; a sample receives I/(r^2 density), the density
-that of the distances along the ray (`reference.monte_carlo.single_scatter.stretches.Part`). A light with extent has a
+that of the distances along the ray (`reference.monte_carlo.single_scatter.stretches.Part`). An area light has a
 point y of its own for each sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w
 the unit vector from y. Its plane clips the ray: what lies behind it gets no light from there. A sun and a sky have an
 irradiance, a sky a direction of its own for each sample. What a light sends where is the answer of Mitsuba's emitter,
-but for lights with extent, which are read again (`reference.monte_carlo.single_scatter.area_sampling`): nothing asks
+but for area lights, which are read again (`reference.monte_carlo.single_scatter.area_sampling`): nothing asks
 Mitsuba's `sample_direction` for these.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from analytic.errors import InputError
 from reference.monte_carlo.single_scatter.area_sampling import (
     AreaLight,
-    LightPoint,
+    LightSample,
     is_area,
     read_area,
     sample_evenly,
@@ -53,15 +53,15 @@ class _Near:
     position: Any = None  # of all samples, where they have one
     medium: Any = None  # pointer to what every path begins in, where that is known
 
-    def point(self, numbers, ray: Ray | None) -> LightPoint:
+    def point(self, numbers, ray: Ray | None) -> LightSample:
         """Return the points of samples with these numbers, for surfaces where no ray is given."""
         raise NotImplementedError
 
-    def sent(self, point: LightPoint, at, from_light) -> Any:
+    def sent(self, point: LightSample, at, from_light) -> Any:
         """Return the intensity towards places in unit directions, over the density of the points [W/sr]."""
         raise NotImplementedError
 
-    def ends(self, point: LightPoint, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
         """Return the ends of the part of a line that the points could light, from the foot [m]."""
         raise NotImplementedError
 
@@ -94,7 +94,7 @@ class _Near:
         from_light = way / r
         return -from_light, self._path(light, way), self.sent(light, hit, from_light) / (r * r)
 
-    def _path(self, light: LightPoint, way) -> Path:
+    def _path(self, light: LightSample, way) -> Path:
         """Return the paths from a hair before the light's own surface, if it has one."""
         begin = mi.Point3f(light.position)
         hair = mi.Vector3f(light.normal) * step_beyond(begin)
@@ -114,16 +114,16 @@ class PointSource(_Near):
     medium: Any = None  #: pointer to what it is in, where that is known
     varies = False
 
-    def point(self, numbers, ray: Ray | None) -> LightPoint:
+    def point(self, numbers, ray: Ray | None) -> LightSample:
         """Return its place, for every sample."""
-        return LightPoint(self.position, mi.Vector3d(0), mi.Float64(1))
+        return LightSample(self.position, mi.Vector3d(0), mi.Float64(1))
 
-    def sent(self, point: LightPoint, at, from_light) -> Any:
+    def sent(self, point: LightSample, at, from_light) -> Any:
         """Return the intensity: the emitter's irradiance times the squared distance."""
         sample, irradiance = self.emitter.sample_direction(at, mi.Point2f(0.5))
         return irradiance * sample.dist * sample.dist
 
-    def ends(self, point: LightPoint, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
         """Return the ends of the part of a line in the cone."""
         if self.axis is None:
             return -dr.inf, dr.inf
@@ -132,25 +132,25 @@ class PointSource(_Near):
 
 @dataclass(frozen=True)
 class AreaSource(_Near):
-    """A light with extent."""
+    """An area light."""
 
     light: AreaLight
     varies = True
 
-    def point(self, numbers, ray: Ray | None) -> LightPoint:
+    def point(self, numbers, ray: Ray | None) -> LightSample:
         """Return points that are spread towards rays, or evenly over the area."""
         u, v = numbers
         if ray is None:
             return sample_evenly(u, v, self.light)
         return sample_point(u, v, self.light, origin=ray.origin_double, direction=ray.direction_double)
 
-    def sent(self, point: LightPoint, at, from_light) -> Any:
+    def sent(self, point: LightSample, at, from_light) -> Any:
         """Return the intensity of points."""
         cosine = dr.maximum(dr.dot(mi.Vector3f(point.normal), from_light), 0)
         density = dr.select(point.density > 0, point.density, 1)
         return self.light.radiance * (cosine / mi.Float(density))
 
-    def ends(self, point: LightPoint, approach: Approach, ray: Ray) -> tuple[Any, Any]:
+    def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
         """Return the ends of the part of a line before the plane of each point."""
         slope = dr.dot(ray.direction_double, point.normal)
         level = dr.dot(ray.origin_double - point.position, point.normal)
@@ -165,7 +165,7 @@ class AreaSource(_Near):
 class FarSource:
     """A sun, or a uniform sky, of which each sample asks in a direction of its own: evenly from the sphere.
 
-    The emitter names a place beyond everything, in clear air: there paths begin.
+    The emitter names a place beyond everything, in vacuum: there paths begin.
     """
 
     emitter: Any  #: Mitsuba's

@@ -95,7 +95,7 @@ class Stretch(Part):
         """Return the transmittance of both ways; see `Part`."""
         at_light = path.medium
         if path.end is not None or not self.around.bounded:
-            at_light = dr.zeros(mi.MediumPtr)  # beyond all shapes is clear air
+            at_light = dr.zeros(mi.MediumPtr)  # beyond all shapes is vacuum
         elif at_light is None:
             at_light = medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
         media = Leg(at_light, self.sigma_t)

@@ -11,7 +11,7 @@ do. Where the extinction depends on the channel, each channel has a run of its o
 picks its channel at random may have infinite variance (DESIGN section 6.7). Boundaries of media are of type 'null':
 paths go through them without counting an edge, and they stay as they are when surfaces turn black.
 
-Lights with extent: light seen directly belongs to neither layer. With `hide_emitters` Mitsuba 3.9.1's `volpath` leaves
+Area lights: light seen directly belongs to neither layer. With `hide_emitters` Mitsuba 3.9.1's `volpath` leaves
 it out, and what the light's own shape does stays: a black one ends camera rays, one of type 'null' lets them pass (its
 integrator `direct` looks through both). Part of such light comes by rays that the phase function or a surface sends on,
 with a weight; these are not shortened, so the shadow-ray epsilon counts in part. The fluence of such a light is at most

@@ -67,9 +67,9 @@ def enclosure(row: Mapping[str, str], *, precision: int = PRECISION) -> arb:
         foot, height = _foot_and_height(row)
         x0, x1, sigma_t, g = (arb(float(row[name])) for name in ("x0", "x1", "sigma_t", "g"))
         w0 = ((x0 - foot) / height).asinh()
-        endless = not x1.is_finite()
+        unbounded = not x1.is_finite()
         # max(w0, 0), as a number: any W is right, and an infinite ball would not be
-        w1 = arb(max(float(w0), 0.0)) + 100 * arb.const_log2() if endless else ((x1 - foot) / height).asinh()
+        w1 = arb(max(float(w0), 0.0)) + 100 * arb.const_log2() if unbounded else ((x1 - foot) / height).asinh()
 
         def integrand(w: acb, analytic: bool) -> acb:
             down = 1 / (1 + (-2 * w).exp())  # sin^2 of half the scattering angle, (1 - c)/2
@@ -78,7 +78,7 @@ def enclosure(row: Mapping[str, str], *, precision: int = PRECISION) -> arb:
 
         # The tolerance is relative, as the values span 28 orders of magnitude; the smallest number stands for zero.
         integral = acb.integral(integrand, w0, w1, rel_tol=arb(2) ** (24 - precision), abs_tol=arb(2) ** -5000).real
-        if endless:
+        if unbounded:
             tail = 2 * _largest_phase(row["phase"], g) * (-sigma_t * height * w1.exp() - w1).exp()
             integral += tail.union(arb(0))
         return (-sigma_t * foot).exp() / height * integral

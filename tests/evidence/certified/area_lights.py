@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Certified rows for lights with extent: one point of a light with its cosine, and spheres beside rays.
+"""Certified rows for area lights: one point of a light with its cosine, and spheres beside rays.
 
     python -m tests.evidence.certified.area_lights
 

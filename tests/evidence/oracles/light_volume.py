@@ -16,7 +16,7 @@ sin(theta) too,
 
     u = a / c,      v = b / c,      s = cos(theta) / (h c),
 
-finite at every theta, even at the end of an endless ray, theta = pi/2.
+finite at every theta, even at the end of an unbounded ray, theta = pi/2.
 
 **The lines.** The borders of texels and their diagonals are lines p a + q b + r c = 0, so a ray meets each of them
 once, where A cos(theta) + B sin(theta) = 0. All of a face's lines are solved for, whether they count or not, clipped to

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Light points lie on their light, have equal power, and their means become those of the light."""
+"""Light samples lie on their light, have equal power, and their means become those of the light."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent are read as they are, and what no method can render is refused by the name of the shape."""
+"""Area lights are read as they are, and what no method can render is refused by the name of the shape."""
 
 import mitsuba as mi
 import numpy as np

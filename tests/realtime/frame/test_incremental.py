@@ -21,7 +21,7 @@ from realtime.scene.animate import (
     turned_light,
     turned_objects,
 )
-from realtime.scene.mesh_adjacency import read_casters
+from realtime.scene.mesh_adjacency import read_occluders
 from realtime.scene.read_scene import Scene, read_scene
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import cube
@@ -48,19 +48,21 @@ def sphere_scene() -> Scene:
 
 
 def cube_of_fog() -> Scene:
-    """A cube of fog beside a caster, over a floor; the kernels of `three-media` take ten times as long to compile."""
+    """A cube of fog by an occluder, over a floor; the kernels of `three-media` take ten times as long to compile."""
     turned = mi.ScalarTransform4f().translate([0.7, 0.4, 0.5]).rotate([1, 2, 3], 40).scale(0.17)
-    caster = {"type": "cube", "to_world": turned}
+    occluder = {"type": "cube", "to_world": turned}
     return read_scene(
         mi.load_dict(
-            clear_scene(size=(32, 24), cube=cube(centre=(0.9, 0.5, 0.6)), caster=caster, floor=tiny_scene()["floor"])
+            clear_scene(
+                size=(32, 24), cube=cube(centre=(0.9, 0.5, 0.6)), occluder=occluder, floor=tiny_scene()["floor"]
+            )
         )
     )
 
 
 def frames(scene: Scene, steps, share: float = 0.1):
     """Yield the scene after each step, and what moved."""
-    objects = read_objects(scene, closed_shapes(read_casters(scene.geometry))) if "objects" in steps else None
+    objects = read_objects(scene, closed_shapes(read_occluders(scene.geometry))) if "objects" in steps else None
     turn = np.eye(3)
     for step in steps:
         moved = dict(STILL)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent in frames: every method renders their points, and frames follow moves."""
+"""Area lights in frames: every method renders their points, and frames follow moves."""
 
 from dataclasses import dataclass, replace
 
@@ -13,7 +13,7 @@ from realtime.frame.renderer import image_frame, light_groups, render_frame, run
 from realtime.methods.interface.method import Layers, Method
 from realtime.methods.registry import METHODS
 from realtime.scene.animate import with_area_lights
-from realtime.scene.light_points import with_light_points
+from realtime.scene.light_samples import with_light_samples
 from tests.helpers import frames
 from tests.helpers.area_lights import ring
 from tests.helpers.frames import read, relative_rmse
@@ -43,7 +43,7 @@ def one_by_one(variant, request):
     scene = scene_of(
         **({} if request.param == "rectangle" else {"changes": {"size": SIZE, "lamp": ring((0.9, 0.7, 1.9), size=0.6)}})
     )
-    lit = with_light_points(scene, 5, "sobol")
+    lit = with_light_samples(scene, 5, "sobol")
     for point in lit.lights:
         alone = replace(scene, lights=(replace(point, source=None),), area_lights=())
         frame = frames.render(alone, "ray-march", steps=1200)

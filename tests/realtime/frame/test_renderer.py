@@ -45,7 +45,7 @@ def test_integral_without_shadows_is_that_of_the_reference(variant, name, kernel
     assert relative_rmse(integral, reference_of(scene).airlight) < (1e-3 if name == "tabulated" else 1e-6)
 
 
-# Uniform steps see their order later: an endless ray is 65 m long, and the light 4 m away.
+# Uniform steps see their order later: an unbounded ray is 65 m long, and the light 4 m away.
 @pytest.mark.slow
 @pytest.mark.claim("march-orders", tolerance="order 2 within 0.15")
 @pytest.mark.parametrize(("spacing", "first"), [("equiangular", 32), ("uniform", 512)])

@@ -26,7 +26,7 @@ from tests.helpers.scenes import spot
 from tests.helpers.sunlit import plank, shaded
 from tests.helpers.transport_formula import use_formula
 
-POINTS = 4  # of a light with extent
+POINTS = 4  # of an area light
 LAMP = {"type": "point", "position": [0.9, 0.7, 1.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
 
 MOVES = {"look": "", "camera": "camera_moved", "light": "light_moved", "objects": "geometry_moved"}
@@ -54,7 +54,7 @@ WAITS: dict[str, tuple[tuple[str, ...], str, dict[str, int]]] = {
 
 
 def scenes() -> dict[str, Callable[[], dict[str, Any]]]:
-    """By name small scenes with each kind of light, and with bounded media in clear air."""
+    """By name small scenes with each kind of light, and with bounded media in vacuum."""
     return {
         "lamp": lambda: lit_by(changes={"lamp": LAMP}),
         "spot": lambda: lit_by(changes={"lamp": spot(cutoff=33.0, beam=21.0)}),

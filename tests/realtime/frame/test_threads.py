@@ -23,7 +23,7 @@ from tests.helpers.transport_formula import use_formula
 from validation.study.configuration import configuration, prepared
 from validation.scenes.loading import load_scene
 
-# The tables of clouds take minutes to make, and are the same whoever draws.
+# The tables of clouds take minutes to make, and are the same anyone who draws.
 use_formula(pytest.MonkeyPatch())
 # As many pixels as several blocks of work have, so that each of the threads gets some.
 fog, clouds = (read_scene(load_scene(name, (128, 96)).scene) for name in ("sphere-spot", "cumulus"))

@@ -34,7 +34,7 @@ def g_of(name, count):
 
 
 def many_rays(count, seed):
-    """Segments of every length, endless ones too; optical depth 1e-6 to 50; heights down to 1e-7 of the distance."""
+    """Segments of every length, unbounded ones too; optical depth 1e-6 to 50; heights down to 1e-7 of the distance."""
     rng = np.random.default_rng(seed)
     height = 10 ** rng.uniform(-7, 0, count)
     foot = rng.choice([-1, 1], count) * np.sqrt(1 - np.minimum(height, 1) ** 2)
@@ -134,7 +134,7 @@ SOFT = ("exact", "quadrature", "quadrature-theta", "taylor", "taylor-printed", "
 
 
 @pytest.mark.parametrize("name", SOFT)
-def test_endless_rays_that_stay_in_the_beam_of_a_soft_spot(name):
+def test_unbounded_rays_that_stay_in_the_beam_of_a_soft_spot(name):
     """The piece behind the beam is empty and at infinity: values were not finite in five of 440 random scenes.
 
     Expected: the reference, without a weight in the beam, to what each kernel is known for. Uniform steps have no end.

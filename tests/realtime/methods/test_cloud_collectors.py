@@ -169,7 +169,7 @@ def test_the_last_frame_s_collectors_go_on(variant, monkeypatch):
 
 @pytest.mark.claim("collector-shade", tolerance="1 % in the middle of the shade and beside it")
 def test_another_cloud_in_the_light_dims_and_changes_no_thickness(variant):
-    """Each cloud has its own maps: clear air between two is no matter, and light fades on its way through the other."""
+    """Each cloud has its own maps: vacuum between two is no matter, and light fades on its way through the other."""
     normal, side = np.asarray(TURN)[:, 2], 20.0
     far = cloud("far", placed(box((300.0, 300.0, side)), tuple(MIDDLE - 900.0 * ALONG), TURN))
     alone = _airlight(_scene(sun=_sun(ALONG), slab=_slab()), map=1024)

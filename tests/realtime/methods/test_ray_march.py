@@ -91,7 +91,7 @@ def test_with_shadows_the_order_is_one(variant):
     [("ray-march", {"spacing": "uniform", "steps": 400}), ("soft-shafts", {"filter": "none", "steps": 400})],
 )
 def test_rays_that_meet_no_medium_and_no_surface_are_black(variant, method, parameters):
-    """Equal steps of an endless ray past all media had the length -inf: `random:19` was not finite in all pixels."""
+    """Equal steps of an unbounded ray past all media had the length -inf: `random:19` was not finite in all pixels."""
     ball = {"type": "sphere", "center": [0.2, 0.1, 0.7], "radius": 0.4}
     scene = clear_scene(pearl=bounded_medium(ball, 0.9, (0.9, 0.4, 0.3)))
     image = render(method, scene=scene, precision="single", **parameters)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where nothing casts a shadow a method is prepared as anywhere else.
 
-Its kernels do not grow with the points of a light with extent, and its airlight is the sum over these points.
+Its kernels do not grow with the points of an area light, and its airlight is the sum over these points.
 """
 
 import drjit as dr
@@ -14,7 +14,7 @@ from realtime.kernels.exact import exact
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.methods.user_method import user_method
 from realtime.scene.camera import ray_directions
-from realtime.scene.light_points import with_light_points
+from realtime.scene.light_samples import with_light_samples
 from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import lamp
 from tests.helpers.scenes import tiny_scene
@@ -30,7 +30,7 @@ POINTS = 4
 
 @pytest.fixture(scope="module")
 def empty(variant):
-    """A lamp with extent in fog, and nothing else."""
+    """A area light in fog, and nothing else."""
     return read_scene(mi.load_dict(tiny_scene(lamp=lamp(), ball=None, floor=None)))
 
 
@@ -51,8 +51,8 @@ def rendered(scene, method, points):
 
 
 def sum_over_points(scene):
-    """Return the airlight of the points by a hundred Gauss-Legendre nodes in the angle at each, for endless rays."""
-    lit = with_light_points(scene, POINTS, "sobol")
+    """Return the airlight of the points by a hundred Gauss-Legendre nodes in the angle at each, for unbounded rays."""
+    lit = with_light_samples(scene, POINTS, "sobol")
     pixel = dr.arange(type(dr.zeros(dr.uint32_array_t(lit.camera.origin.x))), 16 * 12)
     direction = np.array(ray_directions(lit.camera, pixel)[0], dtype=np.float64).T
     origin = np.array(lit.camera.origin, dtype=np.float64).ravel()

@@ -76,6 +76,6 @@ def test_glossy_surfaces_are_noted(variant):
 
 @pytest.mark.claim("first-camera-noted")
 def test_a_second_camera_is_noted(variant):
-    """The first is used, and whoever meant the other is told."""
+    """The first is used, and anyone who meant the other is told."""
     (note,) = read(other={"type": "perspective", "medium": {"type": "ref", "id": "fog"}}).features.notes
     assert "2 cameras: the first is used" in note

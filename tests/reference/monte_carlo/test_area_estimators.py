@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`single-scatter` and `volpath` under lights with extent, against closed forms and against one another."""
+"""`single-scatter` and `volpath` under area lights, against closed forms and against one another."""
 
 import drjit as dr
 import mitsuba as mi

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Airlight, surfaces and emission of lights with extent: against brute force, and as certain as they say."""
+"""Airlight, surfaces and emission of area lights: against brute force, and as certain as they say."""
 
 from dataclasses import replace
 from functools import partial
@@ -12,9 +12,9 @@ from scipy.special import roots_legendre
 from reference.quadrature import area_lights
 from reference.quadrature.area_lights import area_surface, beams_of
 from reference.quadrature.image import quadrature_image
-from reference.quadrature.light_points import light_points
 from reference.quadrature.light_samples import samples_for_rays, sections_for_points
 from reference.quadrature.replicates import PointPlan, square_points, standard_error
+from reference.quadrature.shared_samples import shared_samples
 from reference.quadrature.surface import Reflection, surface_hits
 from reference.scene.read import read_reference
 from reference.visibility.before_light import before_light
@@ -201,7 +201,7 @@ def test_surfaces_by_many_shadow_rays(variant, kind):
     count, replicates = 32, 8
     expected = np.zeros((len(rows), 3, replicates))
     for replicate in range(replicates):
-        for sample in light_points(light, square_points(fixed(count), 3, replicate, kind)):
+        for sample in shared_samples(light, square_points(fixed(count), 3, replicate, kind)):
             way = sample.position - point
             r = np.linalg.norm(way, axis=1)
             way /= r[:, None]

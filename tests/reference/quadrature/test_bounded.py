@@ -144,9 +144,9 @@ def test_agrees_with_volpath(variant, inside):
     Expected: pooled relative bias within four standard errors (a false alarm in 16 000 runs), which are below 3 %.
     """
 
-    caster = tiny_scene()["ball"] | {"center": [0.7, 0.45, 1.2], "radius": 0.21}
+    occluder = tiny_scene()["ball"] | {"center": [0.7, 0.45, 1.2], "radius": 0.21}
     scene = clear_scene(
-        brick=brick(**HG), pearl=pearl((0.6, 0.8, 0.3), scale=2.1), ball=caster, floor=tiny_scene()["floor"]
+        brick=brick(**HG), pearl=pearl((0.6, 0.8, 0.3), scale=2.1), ball=occluder, floor=tiny_scene()["floor"]
     )
     if inside:
         huge = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, -3.5, 1.1]).scale(1.5)}

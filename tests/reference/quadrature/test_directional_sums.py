@@ -87,8 +87,8 @@ def test_ray_through_a_box_in_closed_form(variant, way):
 def test_shadow_of_a_sphere_in_fog(variant):
     """A sphere between sun and box: points by the distance of its centre from their legs, and the plain sum."""
     centre, radius = np.array([-0.71875, 0.25, 1.21875]), 0.1875
-    caster = {"type": "sphere", "center": centre.tolist(), "radius": radius}
-    reference, image = reference_and_image(sunny(brick=brick(), caster=caster))
+    occluder = {"type": "sphere", "center": centre.tolist(), "radius": radius}
+    reference, image = reference_and_image(sunny(brick=brick(), occluder=occluder))
     towards = -reference.directional[0].direction
 
     def lit(point):
@@ -109,7 +109,7 @@ def test_shadow_of_a_sphere_in_fog(variant):
     assert image.left == 0
 
 
-def test_surface_is_dimmed_by_the_bodies_before_it_and_above(variant):
+def test_surface_is_attenuated_by_the_bodies_before_it_and_above(variant):
     """The floor below the sphere of fog: E cos albedo/pi, less the chords of the leg and of the view."""
     floor = {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(6.3), "bsdf": {"type": "diffuse"}}
     reference, image = reference_and_image(sunny(pearl=pearl(), floor=floor))

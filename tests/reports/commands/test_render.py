@@ -71,7 +71,7 @@ def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, 
 
 
 @pytest.mark.claim("flawed-meshes-warn")
-def test_plan_counts_casters_and_warns_of_open_ones_where_planes_have_an_order_of_a_paper(variant, capfd):
+def test_plan_counts_occluders_and_warns_of_open_ones_where_planes_have_an_order_of_a_paper(variant, capfd):
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "--plan", "--json")
     out, err = capfd.readouterr()
     assert "airlight: warning:" not in err

@@ -176,7 +176,7 @@ def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(va
     material = document["materials"][document["meshes"][number]["primitives"][0]["material"]]
     assert material["emissiveFactor"] == [1.0, 0.8, 0.5]
     assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 5.0
-    assert "core glTF has no light with extent" in material["extras"]["note"]
+    assert "core glTF has no area light" in material["extras"]["note"]
     assert material["extras"]["light"]["radiance"] == [5.0, 4.0, 2.5]
     corners = np.asarray(trimesh.load(tmp_path / "tiny.glb", process=False).geometry["lamp"].triangles)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -135,7 +135,7 @@ def test_a_lamp_on_a_quad_of_two_triangles_is_the_rectangle(load, tmp_path, turn
 
 
 def test_a_lamp_on_a_box_is_its_six_sides(load):
-    """Each of them a light with extent of its own, shining outwards; together they send what the box sends."""
+    """Each of them an area light of its own, shining outwards; together they send what the box sends."""
     lights = read_reference(load(shape("cube", GLOW, size=0.3))).area
     assert sorted(light.name for light in lights) == [f"thing-{number}" for number in range(1, 7)]
     outwards = [light.normal @ (light.centre - (0.1, 0.1, 0.7)) for light in lights]

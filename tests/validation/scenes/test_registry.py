@@ -73,7 +73,7 @@ def test_no_number_of_a_scene_is_round(variant, name):
     parameters = mi.traverse(loaded(name).scene)
     light = ("intensity.value", "irradiance.value", "radiance.value", "position")
     endings = ("albedo.value.value", "x_fov", "reflectance.value", *light)
-    # A light with extent is black.
+    # An area light is black.
     keys = [key for key in sorted(parameters.keys()) if key.endswith(endings) and key != "lamp.bsdf.reflectance.value"]
     assert any(key.endswith("x_fov") for key in keys)
     assert any(key.endswith(light) for key in keys)

@@ -65,7 +65,7 @@ def test_chosen_methods_bring_their_standard_configurations():
     assert chosen_configurations(["unshadowed"]) == tuple(
         standard for standard in STANDARD if standard.method == "unshadowed"
     )
-    # Those whose standard configurations say their light points have their defaults too, for scenes without any.
+    # Those whose standard configurations say their light samples have their defaults too, for scenes without any.
     for_extent = {Configuration("soft-shafts"), Configuration("froxel-fog")}
     assert set(chosen_configurations(list(FOG_METHODS))) == set(STANDARD) | for_extent
     with refused("did you mean"):

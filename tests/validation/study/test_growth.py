@@ -42,7 +42,7 @@ def test_a_jump_is_a_cliff():
     [
         ("speed", "open-fog", "wanted some of size, triangles"),
         ("triangles", "open-fog", "has 0 triangles"),
-        ("lights", "fence", "lights with extent only"),
+        ("lights", "fence", "area lights only"),
     ],
 )
 def test_what_a_scene_does_not_have_is_refused(kind, scene, why, variant):

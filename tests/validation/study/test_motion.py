@@ -37,7 +37,7 @@ def test_a_noisy_march_with_history_is_measured_in_several_runs(variant):
 
 def test_what_does_not_move_is_refused(variant):
     loaded = load_scene("penumbra-plane", (16, 12))
-    with pytest.raises(InputError, match="lights with extent"):
+    with pytest.raises(InputError, match="area lights"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1])
     with pytest.raises(InputError, match="wanted at least 10 for a step"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1], stimulus="step", frames=9)

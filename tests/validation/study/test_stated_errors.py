@@ -20,7 +20,7 @@ from validation.study.study import Cell, Measure
 pytestmark = pytest.mark.usefixtures("variant", "own_cache")
 
 HALF, SIGMA_T, ALBEDO, INTENSITY = np.array([0.31, 0.27, 0.23]), 13.7, 0.43, 5.3
-LAMP = np.array([0.83, 0.71, 0.12])  # in the frame of the box, in clear air before the edge [m]
+LAMP = np.array([0.83, 0.71, 0.12])  # in the frame of the box, in vacuum before the edge [m]
 
 
 def turned():

@@ -23,7 +23,7 @@ def solid(sides, centre) -> Any:
 
 
 def scenes() -> dict[str, dict[str, Any]]:
-    """Return sunlit scenes with casters that are meshes, by what is hard about them."""
+    """Return sunlit scenes with occluders that are meshes, by what is hard about them."""
     beam = solid((0.5, 0.4, 0.3), (0.33, 0.27, 1.75))
     return {
         "two media": shaded(solid=beam, plank=plank(), other=solid((0.2, 0.3, 0.9), (-0.6, 0.1, 2.6))),

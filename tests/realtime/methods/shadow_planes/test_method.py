@@ -8,9 +8,9 @@ import pytest
 from realtime.errors import InputError
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
-from tests.helpers.casters import ALL, SOUND
 from tests.helpers.frames import render
 from tests.helpers.light_frames import camera, coloured_fog, lamp
+from tests.helpers.occluders import ALL, SOUND
 from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.parts import mitsuba_mesh
 
@@ -88,7 +88,7 @@ def test_every_place_and_light(variant, change):
 
 @pytest.mark.claim("enclosed-light")
 def test_enclosed_light_is_black(variant):
-    """No silhouette, and all beyond the caster dark."""
+    """No silhouette, and all beyond the occluder dark."""
     frame = render(scene_with(SOUND["sphere"](), lamp=lamp(0.13, -0.07, 1.09)), "shadow-planes")
     assert np.all(frame.airlight == 0)
     assert np.all(frame.surface == 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
-from tests.helpers.planes import bundles, casters_of, crossings, index_of, lit_lengths, rays_of
+from tests.helpers.planes import bundles, crossings, index_of, lit_lengths, occluders_of, rays_of
 
 
 def added_up(index, ways, end, *, order, buffer=None):
@@ -29,7 +29,7 @@ def weight(x):
 
 @pytest.mark.claim("orders-of-the-planes")
 def test_exact_order_is_right_where_shadows_overlap(variant):
-    index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
+    index = index_of(occluders_of("torus", "open cylinder", "crossing spheres"))
     ways = bundles(1920, spread=0.003)
     end = np.full(len(ways), 4.7)
     expected, lit = lit_lengths(index, ways, end, weight=weight)
@@ -42,7 +42,7 @@ def test_exact_order_is_right_where_shadows_overlap(variant):
 @pytest.mark.claim("orders-of-the-planes")
 def test_without_an_order_every_plane_counts(variant):
     """The artefact of Fig. 4, by formula: Gamma at the surface if it is lit, and all planes with their signs."""
-    index = index_of(casters_of("torus", "crossing spheres"))
+    index = index_of(occluders_of("torus", "crossing spheres"))
     ways = bundles(1920, spread=0.003)
     end = np.full(len(ways), 4.7)
     x, gain = crossings(index, ways)
@@ -58,7 +58,7 @@ def test_without_an_order_every_plane_counts(variant):
 @pytest.mark.claim("orders-of-the-planes")
 def test_order_of_the_paper_is_by_the_stencil_rule(variant):
     """Plane by plane in NumPy, towards the camera by the cosine of the edge's middle."""
-    index = index_of(casters_of("torus", "crossing spheres"), precision="double", order="paper")
+    index = index_of(occluders_of("torus", "crossing spheres"), precision="double", order="paper")
     ways = bundles(960, spread=0.003)
     end = np.full(len(ways), 4.7)
     x, gain = crossings(index, ways)
@@ -84,7 +84,7 @@ def test_order_of_the_paper_is_by_the_stencil_rule(variant):
 @pytest.mark.claim("buffer-of-eight-bits")
 def test_buffer_clamps_after_every_plane(variant):
     """Full at the surface, it forgets what is above, and the planes then take away too much."""
-    index = index_of(casters_of("sphere"))
+    index = index_of(occluders_of("sphere"))
     ways = bundles(960, spread=0.003)
     end = np.full(len(ways), 4.7)
     free, lit = added_up(index, ways, end, order="exact")

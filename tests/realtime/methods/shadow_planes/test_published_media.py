@@ -11,15 +11,15 @@ import pytest
 
 import realtime.methods.shadow_planes.published_mesh as module
 from tests.helpers import frames
-from tests.helpers.casters import closed_sphere
 from tests.helpers.frames import relative_rmse
+from tests.helpers.occluders import closed_sphere
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from validation.scenes.parts import mitsuba_mesh
 
 render = partial(frames.render, method="shadow-planes", precision="double")
 
 
-def caster(centre=(0.55, 0.2, 1.35), radius=0.28):
+def occluder(centre=(0.55, 0.2, 1.35), radius=0.28):
     vertices, faces = closed_sphere(3)
     placed = np.array(centre) + radius * np.asarray(vertices)
     return mitsuba_mesh("caster", (placed, np.asarray(faces)), (0.5, 0.4, 0.3))
@@ -62,14 +62,14 @@ def test_the_buffer_holds_surfaces_and_all_lights_pass_by_pass(variant):
 
 @pytest.mark.claim("media-at-vertices", tolerance="errors fall to 0.4 with a quarter of the spacing")
 def test_vertices_in_a_medium_converge_to_pixels(variant, monkeypatch):
-    """One convex caster before a sphere of fog."""
-    scene = clear_scene(ball=fog((0.1, 0.0, 0.4), 0.8), caster=caster())
+    """One convex occluder before a sphere of fog."""
+    scene = clear_scene(ball=fog((0.1, 0.0, 0.4), 0.8), occluder=occluder())
     pixel = render(scene, media="exact").airlight
     errors = []
     for rows, ratio in ((16, 1.5), (64, 1.5**0.25)):
         monkeypatch.setattr(module, "RATIO", ratio)
         vertex = render(scene, evaluation="vertex", rows=rows).airlight
-        # Three pixels see the caster: Gamma on its own triangles is not that of finer planes.
+        # Three pixels see the occluder: Gamma on its own triangles is not that of finer planes.
         differences = np.sort(np.abs(vertex - pixel).max(axis=-1).ravel())[:-3]
         errors.append(np.sqrt(np.mean(differences**2)) / pixel.mean())
     # Kinks at the bounds, and vertices whose rays miss the medium, are of first order.
@@ -78,10 +78,10 @@ def test_vertices_in_a_medium_converge_to_pixels(variant, monkeypatch):
 
 
 @pytest.mark.claim("media-at-vertices", tolerance="relative RMSE 1e-6: rounding")
-def test_without_casters_in_view_a_medium_is_its_end_less_its_entry(variant):
+def test_without_occluders_in_view_a_medium_is_its_end_less_its_entry(variant):
     """Two media, one before the other: Gamma at exit and entry, and what absorbs before as a factor of the ray."""
     media = {"ball": fog((0.1, -0.9, 0.7), 0.4), "behind": fog((0.2, 0.9, 0.8), 0.5, sigma=0.6)}
-    scene = clear_scene(**media, caster=caster(centre=(0.3, 0.1, -30.0)))
+    scene = clear_scene(**media, occluder=occluder(centre=(0.3, 0.1, -30.0)))
     pixel = render(scene, kernel="taylor").airlight
     vertex = render(scene, kernel="taylor", evaluation="vertex", order="paper").airlight
     assert relative_rmse(vertex, pixel) < 1e-6

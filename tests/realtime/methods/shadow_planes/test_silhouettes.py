@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.scene.mesh_adjacency import make_casters
-from tests.helpers.casters import ALL
+from realtime.scene.mesh_adjacency import make_occluders
+from tests.helpers.occluders import ALL
 
 LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}
 
@@ -19,29 +19,29 @@ small = st.integers(-3, 3)
 points = st.tuples(small, small, small)
 
 
-def casters_of(mesh):
-    return make_casters([("mesh", *mesh)])
+def occluders_of(mesh):
+    return make_occluders([("mesh", *mesh)])
 
 
 def determinant(a, b, c):
     return np.einsum("...i,...i->...", a, np.cross(b, c))
 
 
-def layers_over(casters, light, way):
+def layers_over(occluders, light, way):
     """How many layers lie over a direction, triangle by triangle: those of a closed component that face the light."""
-    a, b, c = (casters.vertices[casters.triangles[:, k]] - light for k in range(3))
+    a, b, c = (occluders.vertices[occluders.triangles[:, k]] - light for k in range(3))
     towards = -determinant(a, b, c)  # the normal is turned to the light if the corners run clockwise from outside
     sides = np.stack([determinant(p, q, way) for p, q in ((a, b), (b, c), (c, a))])
     hit = np.all(sides > 0, axis=0) | np.all(sides < 0, axis=0)
     # All corners lie on the far side of the light, or the three sides agree behind it.
     hit &= np.sign(determinant(a, b, c)) * sides[0] > 0
-    counts = hit & ((towards > 0) | (~casters.closed[casters.component] & (towards != 0)))
+    counts = hit & ((towards > 0) | (~occluders.closed[occluders.component] & (towards != 0)))
     return int(counts.sum())
 
 
-def layers_gained(casters, contour, light, start, end):
+def layers_gained(occluders, contour, light, start, end):
     """What the silhouette says is gained on the way from one direction to another, along the shorter arc."""
-    a, b = casters.vertices[contour.edges[:, 0]] - light, casters.vertices[contour.edges[:, 1]] - light
+    a, b = occluders.vertices[contour.edges[:, 0]] - light, occluders.vertices[contour.edges[:, 1]] - light
     across = np.sign(determinant(a, b, start)) - np.sign(determinant(a, b, end))
     within = determinant(start, end, a) * determinant(start, end, b) < 0
     # Two great circles meet twice: the arcs do if a crossing lies on the near side of both.
@@ -58,13 +58,13 @@ def random_directions(seed, count):
     return ways / np.linalg.norm(ways, axis=1)[:, None]
 
 
-def assert_counts_layers(casters, light, *, seed=3, count=12):
+def assert_counts_layers(occluders, light, *, seed=3, count=12):
     light = np.asarray(light, dtype=float)
-    contour = silhouette(casters, light)
+    contour = silhouette(occluders, light)
     ways = random_directions(seed, count)
     for start, end in pairwise(ways):
-        change = layers_over(casters, light, end) - layers_over(casters, light, start)
-        assert layers_gained(casters, contour, light, start, end) == change
+        change = layers_over(occluders, light, end) - layers_over(occluders, light, start)
+        assert layers_gained(occluders, contour, light, start, end) == change
 
 
 def assert_is_cycle(contour):
@@ -79,9 +79,9 @@ def assert_is_cycle(contour):
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize("name", ALL)
 def test_silhouette_counts_layers(name, light):
-    casters = casters_of(ALL[name]())
-    assert_counts_layers(casters, LIGHTS[light], count=30)
-    assert_is_cycle(silhouette(casters, np.array(LIGHTS[light])))
+    occluders = occluders_of(ALL[name]())
+    assert_counts_layers(occluders, LIGHTS[light], count=30)
+    assert_is_cycle(silhouette(occluders, np.array(LIGHTS[light])))
 
 
 @pytest.mark.claim("silhouettes-count-layers")
@@ -95,7 +95,7 @@ def test_silhouette_counts_layers(name, light):
 def test_any_triangles_and_any_light(vertices, faces, light, seed):
     """Whole numbers, so that lights lie in planes, on edges and on vertices, and triangles lie upon one another."""
     mesh = np.array(vertices, dtype=float), np.array(faces) % len(vertices)
-    casters = casters_of(mesh)
-    assume(len(casters.triangles))
-    assert_is_cycle(silhouette(casters, np.array(light, dtype=float)))
-    assert_counts_layers(casters, light, seed=seed, count=4)
+    occluders = occluders_of(mesh)
+    assume(len(occluders.triangles))
+    assert_is_cycle(silhouette(occluders, np.array(light, dtype=float)))
+    assert_counts_layers(occluders, light, seed=seed, count=4)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from realtime.methods.shadow_planes.sweep import sum_lit_intervals
-from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, index_of, lit_lengths, rays_of
+from tests.helpers.planes import CAMERA, LIGHT, bundles, index_of, lit_lengths, occluders_of, rays_of
 
 CAMERAS = {"in the light": CAMERA, "in shadow": -0.7 * LIGHT, "among the casters": np.array([0.1, -0.05, 0.31])}
 NAMES = ["torus", "open cylinder", "Moebius strip"]
@@ -41,7 +41,7 @@ def assert_same(sums, expected, *, tolerance):
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("name", NAMES)
 def test_lit_segments_are_those_between_the_crossings(variant, name, camera):
-    index = index_of(casters_of(name), camera=CAMERAS[camera])
+    index = index_of(occluders_of(name), camera=CAMERAS[camera])
     ways = bundles(1920, spread=0.01, camera=CAMERAS[camera])
     end = np.random.default_rng(3).choice([0.9, 2.7, 6.1, np.inf], len(ways))
     # float32 crossings at grazing angles: 1e-7 over the sine of the angle between ray and plane.
@@ -54,7 +54,7 @@ def test_lit_segments_are_those_between_the_crossings(variant, name, camera):
 @pytest.mark.parametrize("order", ["shuffled", "backwards", "two changed", "five at a time backwards"])
 def test_rays_notice_an_order_that_is_wrong(variant, order):
     """And find their segments with a longer queue, or by selection."""
-    index = index_of(casters_of("torus", "open cylinder", "crossing spheres"))
+    index = index_of(occluders_of("torus", "open cylinder", "crossing spheres"))
     ways = bundles(960, spread=0.01)
     end = np.full(len(ways), np.inf)
     entries, start = np.array(index.entries), np.array(index.start).astype(int)
@@ -80,7 +80,7 @@ def test_rays_notice_an_order_that_is_wrong(variant, order):
 
 def test_segments_begin_where_they_are_told_to(variant):
     """Between two distances, as a spot's cone cuts them: what is lit up to the second less what is up to the first."""
-    index = index_of(casters_of("torus", "open cylinder"))
+    index = index_of(occluders_of("torus", "open cylinder"))
     ways = bundles(960, spread=0.01)
     begin, end = 1.7, np.full(len(ways), 3.3)
     until_end, lit = lit_lengths(index, ways, end, weight=weight)

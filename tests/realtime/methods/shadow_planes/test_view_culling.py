@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""No caster is left out whose shadow is seen."""
+"""No occluder is left out whose shadow is seen."""
 
 import mitsuba as mi
 import numpy as np
@@ -7,7 +7,7 @@ import pytest
 
 from realtime.methods.shadow_planes.silhouettes import components_in_view
 from realtime.scene.camera import read_camera
-from realtime.scene.mesh_adjacency import make_casters
+from realtime.scene.mesh_adjacency import make_occluders
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
@@ -37,21 +37,21 @@ def boxes(rng, count):
     for number in range(count):
         size, place = rng.uniform(0.1, 1.2, 3), rng.normal(size=3) * 3
         meshes.append((f"box {number}", corners * size + place, faces))
-    return make_casters(meshes)
+    return make_occluders(meshes)
 
 
-@pytest.mark.claim("culled-casters")
+@pytest.mark.claim("culled-occluders")
 @pytest.mark.parametrize("w", [1.0, 0.0])
 def test_no_component_is_dropped_whose_shadow_is_seen(variant, w):
     """From a light with a place, and from one at infinity in this direction."""
     rng = np.random.default_rng(11)
     dropped = 0
     for _ in range(40):
-        casters = boxes(rng, 8)
+        occluders = boxes(rng, 8)
         light, origin, target = rng.normal(size=(3, 3)) * 3
         camera = camera_at(origin, target)
-        used = components_in_view(casters, camera, np.append(light, w))
-        for component, (low, high) in enumerate(casters.boxes):
+        used = components_in_view(occluders, camera, np.append(light, w))
+        for component, (low, high) in enumerate(occluders.boxes):
             points = rng.uniform(low, high, (4000, 3))
             beyond = rng.exponential(3, (len(points), 1)) * (rng.random((len(points), 1)) < 0.9)
             if sees(camera, points + beyond * (w * points - light)).any():

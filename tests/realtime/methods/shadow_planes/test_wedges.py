@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.methods.shadow_planes.plane_table import planes_of_rays
-from tests.helpers.planes import CAMERA, LIGHT, bundles, casters_of, crossings, index_of, listed_planes, rays_of
+from tests.helpers.planes import CAMERA, LIGHT, bundles, crossings, index_of, listed_planes, occluders_of, rays_of
 
 NAMES = ["torus", "crossing spheres", "open cylinder", "Moebius strip", "mixed winding", "boxes sharing an edge"]
 CAMERAS = {
@@ -21,7 +21,7 @@ CAMERAS = {
 @pytest.mark.parametrize("name", NAMES)
 def test_wedges_hold_every_plane_that_a_ray_crosses(variant, name, camera):
     for spread, end in ((0.004, np.inf), (0.1, 3.1)):
-        index = index_of(casters_of(name), camera=CAMERAS[camera])
+        index = index_of(occluders_of(name), camera=CAMERAS[camera])
         ways = bundles(960, spread=spread, camera=CAMERAS[camera])
         crossed = crossings(index, ways)[0] < end
         listed = listed_planes(index, rays_of(index, ways, np.full(960, end)))
@@ -34,7 +34,7 @@ def test_wedges_hold_every_plane_that_a_ray_crosses(variant, name, camera):
 
 def test_wedges_stay_in_the_index_whatever_the_azimuth(variant):
     """The azimuth about a light that is at the camera is no number: a load from wedge 2^32 - 1 ended the process."""
-    index = index_of(casters_of("torus"))
+    index = index_of(occluders_of("torus"))
     azimuths = mi.Float([np.nan, np.inf, -np.inf, 1e30, -1e30, 0.5])
     way = (mi.Float([0.6] * 6), mi.Float([0.0] * 6), mi.Float([0.8] * 6))
     first, count = planes_of_rays(index, azimuths, way, mi.Float([0.0] * 6))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Soft shafts are the sum of their light points, less what steps, scale, sharing and filters take from it."""
+"""Soft shafts are the sum of their light samples, less what steps, scale, sharing and filters take from it."""
 
 import mitsuba as mi
 import numpy as np

@@ -2,7 +2,7 @@
 """Sampling distances: the densities against histograms, integrals and a single technique at a time.
 
 The spans cover what a camera can see: a light behind it, beside it, beyond the surface, very close to the ray, spans
-that are short, endless, thin or many mean free paths thick, and the spans that a spot's cone cuts out.
+that are short, unbounded, thin or many mean free paths thick, and the spans that a spot's cone cuts out.
 """
 
 import drjit as dr
@@ -83,7 +83,7 @@ def _probabilities(edges, density):
     weight = step * np.pi * np.cosh(k) * v * rest
     low, high = edges[:-1, None], edges[1:, None]
     width = np.where(np.isinf(high), edges[-2] - edges[0], high - low)
-    # An endless cell goes by y = low + width v/(1 - v).
+    # An unbounded cell goes by y = low + width v/(1 - v).
     y = np.where(np.isinf(high), low + width * v / rest, low + width * v)
     jacobian = np.where(np.isinf(high), width / rest**2, width)
     values = np.array(density(aligned_array(mi.Float64, y.ravel())), dtype=np.float64).reshape(y.shape)
@@ -126,7 +126,7 @@ def test_densities_integrate_to_one(variant, case, name):
 def test_mixture_is_inverted(variant):
     """Rationale: the estimator divides by the mixture's density, so its distribution must be inverted to rounding.
 
-    Setup: random spans over many orders of magnitude, endless ones among them.
+    Setup: random spans over many orders of magnitude, unbounded ones among them.
     """
 
     rng = np.random.default_rng(5)

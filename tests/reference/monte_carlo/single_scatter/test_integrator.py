@@ -146,7 +146,7 @@ def _box_and_sphere(lamp):
 
 _HALF, _BOX_SIGMA = np.array([1.1, 0.9, 0.8]), np.array([0.9, 0.4, 0.2])
 _CENTRE, _RADIUS, _SPHERE_SIGMA = np.array([2.6, 0.2, 0.0]), 0.7, 0.5
-_LAMPS = {"in clear air": np.array([1.7, 0.4, 1.5]), "in the box": np.array([0.31, 0.23, 0.11])}
+_LAMPS = {"in vacuum": np.array([1.7, 0.4, 1.5]), "in the box": np.array([0.31, 0.23, 0.11])}
 
 
 _BODIES = [
@@ -178,7 +178,7 @@ def _optical_depth(start, end):
 def test_bounded_media_against_a_plain_sum(variant, place):
     """Rationale: boundaries are walked on both legs; slabs and spheres have crossings in closed form.
 
-    Setup: coloured fog in a box, grey in a sphere, camera in clear air, a wall behind; 40 rays, 4000 midpoints
+    Setup: coloured fog in a box, grey in a sphere, camera in vacuum, a wall behind; 40 rays, 4000 midpoints
     each, whose own error is below 1e-6.
     """
     lamp = _LAMPS[place]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Skies and lights with extent in height fog, density grids and bounds: estimators that share no sample agree."""
+"""Skies and area lights in height fog, density grids and bounds: estimators that share no sample agree."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent as light points: what methods render of them."""
+"""Area lights as light samples: what methods render of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,20 +18,20 @@ from realtime.scene.read_scene import Scene
 Array = NDArray[np.float64]
 
 
-def with_light_points(scene: Scene, points: int, pattern: str) -> Scene:
-    """Return a scene whose lights are the ordinary ones, followed by the points of each light with extent in turn.
+def with_light_samples(scene: Scene, points: int, pattern: str) -> Scene:
+    """Return a scene whose lights are the ordinary ones, followed by the points of each area light in turn.
 
     `scene`: from `realtime.scene.read_scene.read_scene`; `points`, `pattern`: see
-    `realtime.area_lights.points.LightPoints`. Raises InputError for a number or a pattern that there is not.
+    `realtime.area_lights.points.LightSamples`. Raises InputError for a number or a pattern that there is not.
     """
     ordinary = tuple(light for light in scene.lights if light.source is None)
-    return replace(scene, lights=ordinary + light_points(scene, points, pattern))
+    return replace(scene, lights=ordinary + light_samples(scene, points, pattern))
 
 
-def light_points(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
-    """Return the points of the lights with extent of a scene, light after light.
+def light_samples(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
+    """Return the points of the area lights of a scene, light after light.
 
-    `scene`: the scene; `points`, `pattern`: see `realtime.area_lights.points.LightPoints`. Raises InputError for a
+    `scene`: the scene; `points`, `pattern`: see `realtime.area_lights.points.LightSamples`. Raises InputError for a
     number or a pattern that there is not.
     """
     types = types_of(type(scene.camera.origin.x))
@@ -41,7 +41,7 @@ def light_points(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
 
 @dataclass(frozen=True)
 class LightFrame:
-    """A light point, or one of several in each lane, and the orthonormal frame of its normal."""
+    """A light sample, or one of several in each lane, and the orthonormal frame of its normal."""
 
     position: Any  #: [m]
     across: Any
@@ -54,7 +54,7 @@ class LightFrame:
         return dr.dot(vector, self.across), dr.dot(vector, self.up), dr.dot(vector, self.normal)
 
     def shadow_ray(self, point: Any) -> Any:
-        """Return the Mitsuba ray that is blocked where a light point does not reach a point [m]."""
+        """Return the Mitsuba ray that is blocked where a light sample does not reach a point [m]."""
         start = mi.Point3f(self.position + self.normal * self.lift)
         direction = mi.Vector3f(point) - mi.Vector3f(start)
         length = dr.norm(direction)
@@ -63,7 +63,7 @@ class LightFrame:
 
 
 def light_frames(points: Sequence[Light]) -> LightFrame:
-    """Return light points in one table, a lane each, so that one loop goes over them, whatever their number.
+    """Return light samples in one table, a lane each, so that one loop goes over them, whatever their number.
 
     They are brought to the host together, which waits for the device once.
     """
@@ -83,7 +83,7 @@ def light_frames(points: Sequence[Light]) -> LightFrame:
 
 
 def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
-    """Return light points of a table by their numbers."""
+    """Return light samples of a table by their numbers."""
     assert frames is not None
     return dr.gather(LightFrame, frames, number)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The airlight of a light point, with the cosine at its normal, against adaptive quadrature that shares nothing."""
+"""The airlight of a light sample, with the cosine at its normal, against adaptive quadrature that shares nothing."""
 
 import mitsuba as mi
 import numpy as np
@@ -81,7 +81,7 @@ def integrals(rays, kernel, precision, isotropic):
 
 
 @pytest.mark.claim(
-    "light-points-exact", tolerance="1e-10: both are adaptive or have many nodes; float32 1e-6 in 9 of 10"
+    "light-samples-exact", tolerance="1e-10: both are adaptive or have many nodes; float32 1e-6 in 9 of 10"
 )
 @pytest.mark.parametrize("isotropic", [True, False])
 def test_exact_integrates_the_cosine(variant, rays, isotropic):

@@ -20,7 +20,7 @@ from reference.scene.read import ReferenceLight
 Array = NDArray[np.float64]
 
 
-def light_points(light: ReferenceAreaLight, square: Array) -> Sequence[ReferenceLight]:
+def shared_samples(light: ReferenceAreaLight, square: Array) -> Sequence[ReferenceLight]:
     """Return the points of a light as lights whose mean is the light.
 
     `light`: the light; `square`: points of the unit square, (n, 2) [1]. Returns each with the intensity radiance times

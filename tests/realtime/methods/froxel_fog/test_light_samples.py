@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lights with extent in froxels: one loop over the points of a table is the sum over the lights one by one.
+"""Area lights in froxels: one loop over the points of a table is the sum over the lights one by one.
 
 Protects the claim on the order of convergence in `penumbra-plane`.
 """
