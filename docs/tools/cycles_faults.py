@@ -334,7 +334,7 @@ FAULTS: dict[str, Fault] = {
     ),
     "g-sign": ("g-sign", "Anisotropy -g", anisotropy(lambda g: -g)),
     "g-lobe": ("g", "Anisotropy 0.3 more", anisotropy(lambda g: g + 0.3)),
-    "g-0": ("g", "Anisotropy 0, as a new node has it", anisotropy(lambda g: 0.0)),
+    "g-0": ("phase", "Anisotropy 0, which is isotropic, as a new node has it", anisotropy(lambda g: 0.0)),
     "multiple": ("multiple", "32 bounces", bounces(32)),
     "near-1": ("near-plane", "Clip Start 1 m", camera(clip_start=1.0)),
     "near-0.1": ("near-plane", "Clip Start 0.1 m, Blender's own", camera(clip_start=0.1)),

@@ -161,7 +161,7 @@ class SceneLight:
 
 def _sight(seen: Seen) -> tuple[Any, ...]:
     """Return what of an image its pixels depend on, and their paths."""
-    return seen.area, seen.holds, seen.samples, seen.rays, seen.used.tobytes()
+    return seen.area, seen.holds, seen.samples, seen.rays, seen.used.tobytes(), seen.cut_off.tobytes()
 
 
 @dataclass

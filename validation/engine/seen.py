@@ -4,6 +4,7 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -32,6 +33,7 @@ PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre,
 
 _MOST_RAYS = 3200  # every pixel of an image of 64 x 48
 _FEWEST = 64  # pixels, whatever rays they need
+_FEW = 4  # pixels that values may be cut off in, and that are looked at: chance may meet none of them
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _MOST_SAMPLES = 128  # of an area light
 _SETTLED = 0.005  # mean relative change of an image with twice the samples, below which there are enough
@@ -64,7 +66,15 @@ class Seen:
             pixels = np.unique(pixels[np.minimum(places.astype(np.int64), len(pixels) - 1)])
             if apart:
                 pixels = self._with_partners(pixels[::2], apart)
+            pixels = np.union1d(pixels, self.cut_off[_evenly(len(self.cut_off), count / int(self.used.sum()))])
         return view_of(self.reference, pixels, rays_per_side=_SIDE if self.area else 0, offset=offset, zoom=zoom)
+
+    @cached_property
+    def cut_off(self) -> Index:
+        """The pixels at the largest value, if several share it, as values do that are cut off there, (n,)."""
+        most = self.values[self.used].max(initial=0.0)
+        pixels = np.flatnonzero(self.used & (self.values == most).any(axis=1))
+        return pixels if most > 0 and len(pixels) >= _FEW else pixels[:0]
 
     def model(self, view: View, lights: tuple[ReferenceLight, ...] | None = None, **how: Any) -> FogModel:
         """Return the paths of the light that the image holds; `how`: see `scattering_paths`."""
@@ -86,6 +96,11 @@ class Seen:
             (pixels % self.reference.width + apart < self.reference.width) & (partners < len(self.used))
         ]
         return np.asarray(np.union1d(pixels, partners[self.used[partners]]), dtype=np.int64)
+
+
+def _evenly(count: int, fraction: float) -> Index:
+    """Return that fraction of so many numbers, and `_FEW` at least, spread evenly."""
+    return np.linspace(0, count - 1, min(count, max(_FEW, round(count * fraction)))).astype(np.int64)
 
 
 def seen_image(

@@ -16,8 +16,10 @@ from reference.storage.exr import Image
 from tests.helpers.planted_faults import PLANTED
 from validation.engine.diagnose import diagnose_image
 from validation.engine.evidence import is_noise
+from validation.engine.judged_layer import judged_layer
 from validation.engine.prediction import Guess, SceneLight
 from validation.engine.search import Explanation
+from validation.engine.seen import seen_image
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import scattering_paths, view_of
 from validation.scenes.loading import load_scene
@@ -175,3 +177,20 @@ def test_the_fog_alone_is_too_bright(scenes):
     assert said.ranked[0].parameter == pytest.approx(8.3, rel=1e-2)
     assert said.rest.startswith("noise")
     assert "which is noise" in "\n".join(said.lines)
+
+
+@pytest.mark.claim("diagnosis-planted")
+def test_values_that_few_pixels_have_cut_off_are_looked_at(variant):
+    """Of 19 200 pixels 240 are at the largest value; 352 are looked at, and chance had two of the 240 among them."""
+    scene = load_scene("open-fog", (160, 120)).scene
+    values = np.random.default_rng(3).random((120, 160, 3))
+    whole, _ = seen_image(Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene)
+    assert not len(whole.cut_off)
+    values[40:50, 70:94] = 1.0
+    seen, _ = seen_image(Image({"total": values}), judged_layer(Image({"total": values}), "", holds="total"), scene)
+    pixels, before = (replace(each, area=True).view(most=3200, apart=2).pixels for each in (seen, whole))
+    added = np.setdiff1d(pixels, before)
+    assert len(seen.cut_off) == 240
+    assert np.isin(pixels, seen.cut_off).sum() >= 4
+    assert np.isin(added, seen.cut_off).all()
+    assert len(added) <= 5  # 355 of 19 200 pixels are looked at, 1.25 % of which are cut off
