@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The picture of the live view in the documentation: `python -m reports.docs.live_view [FILE.png]`.
+"""The picture of the live view in the documentation: `python docs/tools/live_view.py [FILE.png]`.
 
 It starts `airlight view`, opens its page in Chromium by Playwright (the extra `test`), and waits for the reference.
 """
