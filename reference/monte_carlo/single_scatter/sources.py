@@ -11,6 +11,7 @@ Mitsuba's `sample_direction` for these.
 """
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,23 +48,23 @@ class Sample:
     counts: Any  #: mask
 
 
-class _Near:
+class _Near(ABC):
     """Lights at places: a subclass has points, says what these send, and what part of a ray they could light."""
 
     position: Any = None  # of all samples, where they have one
     medium: Any = None  # pointer to what every path begins in, where that is known
 
+    @abstractmethod
     def point(self, numbers, ray: Ray | None) -> LightSample:
         """Return the points of samples with these numbers, for surfaces where no ray is given."""
-        raise NotImplementedError
 
+    @abstractmethod
     def sent(self, point: LightSample, at, from_light) -> Any:
         """Return the intensity towards places in unit directions, over the density of the points [W/sr]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
         """Return the ends of the part of a line that the points could light, from the foot [m]."""
-        raise NotImplementedError
 
     def on_ray(self, u, numbers, ray: Ray, part: Part, active) -> Sample:
         """Return samples on rays, for `u` uniform in [0, 1) and `numbers` in the unit square."""
