@@ -188,7 +188,7 @@ def map_size(
     label = replace(by_size[0], parameters=tuple(each for each in by_size[0].parameters if each[0] != "map")).label
     tables, said, rows, data, drawn = [], [], [], [], []
     for scene, tell in scene_by_scene(loaded, "map-size", progress):
-        cell = cells_of(scene, usual.measure, apart=apart)[1]
+        *_, cell = cells_of(scene, usual.measure, apart=apart)
         errors: list[dict[str, Any]] = []
         for number, chosen in enumerate(by_size):
             tell(number / len(by_size), chosen.label)

@@ -42,8 +42,8 @@ def scene_by_scene(loaded: list[Any], title: str, progress: Any) -> Iterator[tup
             yield scene, part
 
 
-def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Callable[[Any], tuple[Any, Any]]]:
-    """Return the reference of a scene, and what gives row and frame of a configuration, compared with it.
+def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Any, Callable[[Any], tuple[Any, Any]]]:
+    """Return a scene as methods see it, its reference, and what gives row and frame of a configuration beside it.
 
     Methods of users run in processes of their own if they can be found there, `apart`.
     """
@@ -56,7 +56,11 @@ def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Callable[[
 
     scene, reference = read_scene(loaded.scene), of_image(reference_image(loaded.scene))
     path, elsewhere = str(loaded.path or loaded.name), in_own_process if apart else None
-    return reference, lambda each: run(Cell(path, loaded.size, (), each, measure), scene, reference, apart=elsewhere)
+
+    def cell(chosen: Any) -> tuple[Any, Any]:
+        return run(Cell(path, loaded.size, (), chosen, measure), scene, reference, apart=elsewhere)
+
+    return scene, reference, cell
 
 
 def check_study(
@@ -74,14 +78,6 @@ def check_study(
         works.append(reference_work(each.size, lights=len(scene.lights) + len(scene.area_lights)))
         works += [configuration_work(scene, one, frames or TIMED) for one in chosen]
     check_work(what, works)
-
-
-def _useful(loaded: Any, chosen: list[Any]) -> tuple[Any, ...]:
-    """Return the configurations that differ in a scene from the ones before them."""
-    from realtime.scene.read_scene import read_scene
-    from validation.study.scene import configurations_for
-
-    return configurations_for(read_scene(loaded.scene).features, chosen)
 
 
 class MethodsStudy(Study):
@@ -166,6 +162,7 @@ def methods(
     from reports.report.scene import row_record
     from reports.tables.methods import methods_table
     from validation.metrics.errors import plain
+    from validation.study.scene import configurations_for
     from validation.study.study import Measure
 
     chosen, apart = asked_configurations(method, kernel, settings)
@@ -173,8 +170,8 @@ def methods(
     check_study("methods", loaded, chosen, progress=progress)
     benched, tables, wrong, rows = [], [], [], []
     for scene, tell in scene_by_scene(loaded, "methods", progress):
-        cell = cells_of(scene, Measure("stages", seconds, every_metric=False), apart=apart)[1]
-        useful, records = _useful(scene, chosen), []
+        read, _, cell = cells_of(scene, Measure("stages", seconds, every_metric=False), apart=apart)
+        useful, records = configurations_for(read.features, chosen), []
         for at, each in enumerate(useful):
             tell(at / len(useful), each.label)
             row = cell(each)[0]
@@ -280,11 +277,11 @@ def _split(
     loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progress: Any
 ) -> tuple[list[dict[str, Any]], Any]:
     """Return the errors of a scene by cause, JSON-ready and with their images."""
-    from realtime.scene.read_scene import read_scene
     from validation.metrics.errors import plain
     from validation.study.causes import decompose
+    from validation.study.scene import configurations_for
 
-    reference, cell = cells_of(loaded, measure, apart=apart)
+    scene, reference, cell = cells_of(loaded, measure, apart=apart)
 
     @cache
     def airlight(configuration: Any) -> Any:
@@ -294,13 +291,13 @@ def _split(
         return frame.airlight
 
     entries, split = [], []
-    useful = _useful(loaded, chosen)
+    useful = configurations_for(scene.features, chosen)
     for at, each in enumerate(useful):
         progress((1 + at) / (1 + len(useful)), each.label)
         entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
         entry |= {"parameters": dict(each.parameters)}
         try:
-            found = decompose(read_scene(loaded.scene), each, reference.airlight, airlight)
+            found = decompose(scene, each, reference.airlight, airlight)
         except InputError as error:
             entries.append(entry | {"refused": str(error)})
             continue
