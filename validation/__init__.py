@@ -9,7 +9,7 @@ Read in this order:
 - `statistics/`: tests for images with random errors, and the noise of errors and times;
 - `columns.py`: records that know their columns: heading, unit, meaning;
 - `readers.py`: values in files of users;
-- `clock.py`: times and memory of any work;
+- `clock.py`, `timing.py`: times and memory of any work, and the record of a time;
 - `estimates/`: the reference of a scene by each estimator, budgets, and the agreement of the estimators;
 - `study/`: scenes x sizes x changes x configurations: what each combination costs and how wrong it is;
 - `certified/`: files of certified values: twelve scenes of fog, and airlight integrals;

@@ -12,14 +12,13 @@ import gc
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import drjit as dr
 import numpy as np
 
-from validation.columns import column
+from validation.timing import Timing
 
 _MIB = 1024  # of the numbers in `status` [KiB]
 _FORGET = "5"  # what makes Linux forget the peak so far
@@ -38,27 +37,6 @@ class Run(NamedTuple):
     value: Any
     ms: float  #: by the wall clock [ms]
     cpu_ms: float  #: of the processors, of all threads [ms]
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Repeated measurements of one piece of work [ms]."""
-
-    median_ms: float = column("median", "ms", "of the wall clock")
-    low_ms: float = column("first quartile", "ms", "of the wall clock")
-    high_ms: float = column("third quartile", "ms", "of the wall clock")
-    repetitions: int = column("repetitions", "1", "how often it was measured")
-    cpu_ms: float | None = column("processor", "ms", "least processor time, of all threads", default=None)
-
-    @property
-    def interval(self) -> list[float]:
-        """The median with its quartiles [ms]."""
-        return [self.median_ms, self.low_ms, self.high_ms]
-
-    @property
-    def rate(self) -> list[float]:
-        """How often a second, with its quartiles [1/s]."""
-        return [1000 / self.median_ms, 1000 / self.high_ms, 1000 / self.low_ms]
 
 
 def stopwatch() -> Callable[[], Took]:

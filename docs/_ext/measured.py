@@ -25,7 +25,7 @@ _METHOD = ("frame", "light_moved", "relative_rmse", "relative_bias", "p99", "max
 
 @dataclass(frozen=True)
 class KeptScene:
-    """What the documentation keeps of a scene."""
+    """The numbers that the documentation keeps of a scene."""
 
     name: str
     size: records.Size
@@ -45,11 +45,14 @@ def data() -> dict[str, Any]:
 @cache
 def kept_scenes() -> tuple[KeptScene, ...]:
     """Return what is kept of every scene; what is not kept of a method or its errors is what it usually is."""
-    kept = data()["scenes"]
-    for entry in (entry for scene in kept for entry in scene["methods"]):
-        entry |= {"kind": "built-in", "layer": "airlight", "surface_error": None, "flip": None, "files": {}}
-        entry["error"] = entry["error"] and {"pixels": 0, "bias": None, "rmse": None} | entry["error"]
-    return tuple(record_of(scene, KeptScene) for scene in kept)
+    usual = {"kind": "built-in", "layer": "airlight", "surface_error": None, "flip": None, "files": {}}
+
+    def row(entry: Mapping[str, Any]) -> dict[str, Any]:
+        error = entry["error"] and {"pixels": 0, "bias": None, "rmse": None} | entry["error"]
+        return {**entry, **usual, "error": error}
+
+    scenes = ({**scene, "methods": [row(entry) for entry in scene["methods"]]} for scene in data()["scenes"])
+    return tuple(record_of(scene, KeptScene) for scene in scenes)
 
 
 def provenance() -> str:

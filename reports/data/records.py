@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from validation.columns import column
+from validation.metrics.errors import RunsError
 from validation.papers.claims import Judged
+from validation.timing import Timing
 
 SCHEMA = "airlight-report/2"
 
@@ -165,17 +167,6 @@ class Multiple:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Timing:
-    """Repeated measurements of one piece of work."""
-
-    median_ms: float = column(unit="ms")
-    low_ms: float = column(unit="ms", meaning="lower quartile")
-    high_ms: float = column(unit="ms", meaning="upper quartile")
-    repetitions: int = column(meaning="that were timed")
-    cpu_ms: Number = column(unit="ms", meaning="least processor time; `null` where stages were timed", default=None)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Times:
     """The times of a frame and of its stages; of an image the frame alone."""
 
@@ -210,19 +201,6 @@ class Errors:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Noise:
-    """Errors of a method that draws random numbers, over independent runs, see `validation.study.row.RunsError`."""
-
-    runs: int
-    bias: float
-    bias_within: float
-    rmse: float
-    rmse_within: float
-    root_bias: Number
-    most_bias: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class Flip:
     """HDR-FLIP."""
 
@@ -254,7 +232,7 @@ class MethodRow:
         meaning="`cost` of the [rows of a sweep](#rows-of-a-sweep); `null` for images", default=None
     )
     error: Errors | None = column(meaning="against the reference")
-    noise: Noise | None = column(meaning="of a method that draws random numbers: errors over runs", default=None)
+    noise: RunsError | None = column(meaning="of a method that draws random numbers: errors over runs", default=None)
     surface_error: Errors | None = column(meaning="the same for the lit surface; `null` if there is none")
     flip: Flip | None = column(meaning="HDR-FLIP of all light, or why there is none; `null` if not asked for")
     parameters: Mapping[str, float | bool | str] = column(meaning="of the configuration")

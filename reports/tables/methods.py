@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from realtime.methods.shader.source import is_shader
 from reports.data.reader import meanings
-from reports.data.records import MethodRow, Scene, Times, Timing
+from reports.data.records import MethodRow, Scene, Times
 from reports.tables.table import (
     Column,
     Name,
@@ -22,6 +22,7 @@ from reports.tables.table import (
 )
 from validation.columns import columns_of
 from validation.metrics.errors import Metrics
+from validation.timing import Timing
 
 #: What is timed of a frame, by its name in report.json.
 TIMES = tuple(meanings(Times))

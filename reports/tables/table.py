@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # making its classes would take a tenth of the time of `airlight --help`
-    from reports.data.records import Timing
+    from validation.timing import Timing
 
 
 @dataclass(frozen=True)

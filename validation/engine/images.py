@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import read_exr
-from validation.clock import Timing
 from validation.engine.judge import EngineComparison, ReferenceOf, judge_image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, judged_layer
 from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.loading import LoadedScene
+from validation.timing import Timing
 
 TIMES = "times.json"  #: what lies beside images and says how long they took
 

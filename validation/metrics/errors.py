@@ -44,6 +44,19 @@ class Metrics:
     negative: int = column("negative", "pixels", "with a negative value in the test image; they stay in the averages")
 
 
+@dataclass(frozen=True)
+class RunsError:
+    """Bias and error of a method that draws random numbers, from independent runs, relative to the reference's mean."""
+
+    runs: int = column("runs", "1", "independent renders of the frame")
+    bias: float = column("bias", "1", "mean over the runs")
+    bias_within: float = column("bias within", "1", "half of the 95 % interval of the bias")
+    rmse: float = column("rel. RMSE", "1", "of one run, mean over the runs")
+    rmse_within: float = column("RMSE within", "1", "half of the 95 % interval of that mean")
+    root_bias: float | None = column("bias by pixel", "1", "root of the squared bias, where two of its errors above 0")
+    most_bias: float = column("at most", "1", "root of the squared bias and two of its errors")
+
+
 def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None) -> Metrics:
     """Compare a test image with a reference (formulae: see the module).
 

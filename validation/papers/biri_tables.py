@@ -28,12 +28,13 @@ from realtime.methods.shadow_planes.method import PlanePreparation
 from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
-from validation.clock import Timing, time_in_turns
+from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene
 from validation.study.configuration import Configuration, configuration, prepared
 from validation.study.frame_times import first_frame, moved_light
+from validation.timing import Timing
 
 STAGES = ("silhouettes", "scene", "airlight", "sorting", "planes")  #: of Table 1
 _COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these references [pixels]

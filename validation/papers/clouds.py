@@ -26,12 +26,13 @@ from realtime.methods.registry import METHODS
 from realtime.scene.mesh_adjacency import mesh_triangles
 from realtime.scene.read_scene import Scene, read_scene
 from reference.scene.clouds import CloudScene, read_clouds
-from validation.clock import Timing, time_repeated
+from validation.clock import time_repeated
 from validation.estimates.images import Budget, monte_carlo_reference
 from validation.scenes.loading import LoadedScene, load_scene, resize
 from validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
 from validation.scenes.registry import SCENES
 from validation.study.frame_times import first_frame
+from validation.timing import Timing
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]

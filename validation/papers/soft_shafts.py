@@ -29,11 +29,12 @@ from numpy.typing import NDArray
 
 from realtime.frame.renderer import render_frame, run_cast_and_shade
 from realtime.scene.read_scene import Scene, read_scene
-from validation.clock import Timing, time_in_turns
+from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 from validation.study.configuration import SHARED_POINTS, Configuration, prepared
 from validation.study.frame_times import moved_light
+from validation.timing import Timing
 
 Array = NDArray[np.float64]
 

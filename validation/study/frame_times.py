@@ -27,8 +27,9 @@ from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
-from validation.clock import Timing, Took, stopwatch, time_repeated, timed, timing_of
+from validation.clock import Took, stopwatch, time_repeated, timed, timing_of
 from validation.columns import column
+from validation.timing import Timing
 
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
 #: or more frames would take minutes.

@@ -14,13 +14,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from validation.clock import Timing
 from validation.columns import Column, column, columns_of, values_of
 from validation.metrics.colour import ColourDifference
-from validation.metrics.errors import RADIANCE, Metrics, plain
+from validation.metrics.errors import RADIANCE, Metrics, RunsError, plain
 from validation.metrics.flip import Flip
 from validation.metrics.other_tools import PublishedErrors
 from validation.study.frame_times import FrameTimes
+from validation.timing import Timing
 
 #: What came of a cell. 'done': numbers; 'refused': the method, or the reference, says that it cannot do this scene, and
 #: `reason` why; 'left out': a frame would take too long; 'failed': an exception; 'hung': stopped at the time limit;
@@ -55,19 +55,6 @@ class StatedError:
 
     bound: float = column("stated", "1", "error that the method states here, relative to the pixel as in `error.max`")
     outside: int = column("outside", "pixels", "whose error exceeds the bounds of method, reference and rounded ends")
-
-
-@dataclass(frozen=True)
-class RunsError:
-    """Bias and error of a method that draws random numbers, from independent runs, relative to the reference's mean."""
-
-    runs: int = column("runs", "1", "independent renders of the frame")
-    bias: float = column("bias", "1", "mean over the runs")
-    bias_within: float = column("bias within", "1", "half of the 95 % interval of the bias")
-    rmse: float = column("rel. RMSE", "1", "of one run, mean over the runs")
-    rmse_within: float = column("RMSE within", "1", "half of the 95 % interval of that mean")
-    root_bias: float | None = column("bias by pixel", "1", "root of the squared bias, where two of its errors above 0")
-    most_bias: float = column("at most", "1", "root of the squared bias and two of its errors")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from validation.clock import Timing
 from validation.engine.hints import find_hints
 from validation.engine.images import (
     TIMES,
@@ -21,6 +20,7 @@ from validation.engine.images import (
     notes_of,
 )
 from validation.scenes.loading import load_scene
+from validation.timing import Timing
 
 SCENES = {"open-fog": "open-fog", "hall": "hall", "hall.small": "hall.small", "mine": "folder/mine.xml"}
 SHAPE = (4, 6, 3)

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from realtime.scene.read_scene import read_scene
-from validation.clock import Timing
 from validation.kernels.rays import wide_rays
 from validation.papers import billeter_tables, biri_tables, soft_shafts
 from validation.papers.biri_tables import STAGES, fractions
@@ -31,6 +30,7 @@ from validation.papers.formulas import _annex, _cloud_equations, _droplets, prin
 from validation.papers.scattering import fitted_constant, left_over
 from validation.papers.shadow_planes import drawn
 from validation.scenes.loading import load_scene
+from validation.timing import Timing
 
 MEASURED = json.loads(Path(__file__).with_name("figures.json").read_text(encoding="utf-8"))
 JUDGED = [claim for claim in claims() if claim.direction]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from reports.data.records import Growth, Times, Timing
+from reports.data.records import Growth, Times
 from tests.helpers.calibration import power
 from tests.helpers.reports import record_of, sampled, times
 from validation.statistics.noise import (
@@ -27,6 +27,7 @@ from validation.statistics.samples import (
     sidak,
     student_quantile,
 )
+from validation.timing import Timing
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 12), (12, 12), (3, 40), (992, 1000), (0, 0)])
