@@ -172,7 +172,7 @@ class RayGeometry:
         """Cut [x0, x1] [m] where a soft spot's `falloff` has kinks, at the cone of the beam; others are one piece.
 
         A ray that misses the beam is cut where it is closest to the axis: the closer it passes, the more like a kink.
-        Of an unbounded ray that stays in the beam the last piece, which is empty, lies at its beginning: at infinity
+        The last piece of an unbounded ray that stays in the beam is empty and lies at its beginning: at infinity
         kernels would multiply 0 by infinity. Valid for any segment.
         """
         if light.beam is None:
@@ -195,7 +195,7 @@ class RayGeometry:
     def falloff(self, light: Light, x):
         """Return the relative intensity of a light at the point at `x`, for one that varies [1].
 
-        Of a light sample it is the cosine at its normal, 0 behind its plane. Of a spot it is Mitsuba's profile, linear
+        A light sample has the cosine at its normal, 0 behind its plane. A spot has Mitsuba's profile, linear
         in the angle: one inside the beam, zero outside the cut-off; between the two, (cutoff - angle) / (cutoff -
         beam). The angle is that of the distances from the axis and along it: near the axis a cosine alone has lost it.
         """

@@ -131,7 +131,7 @@ def light_once(
     if clouds.density is not None:
         full = optical_depths(rays.surfaces, clouds, rays.origin, rays.direction, rays.end, first=rays.first)
     mean = sum(full) / (channels * SPREAD)
-    # Of thin clouds rounding leaves nothing of 1 - exp(-T): it is never below the first two terms of its series.
+    # In thin clouds 1 - exp(-T) is lost in rounding; the first two terms of its series, which it exceeds, are not.
     share = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) / steps
 
     def step(total, x, cloud, inside):

@@ -9,9 +9,9 @@ What the function raises while it is recorded ends the recording as if it had re
 Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
 
 **Tables of kernels.** A frozen function cannot take an array from the host, and reads one on the device only if it is
-among its inputs. So a kernel may have a `prepare`, ``prepare(Float, **parameters) -> tables``, which `prepared_by`
-gives it. Who freezes a function calls `prepare_kernel` before, passes what it returns as an input, and calls the kernel
-as `with_tables` makes it. A kernel without `prepare` knows nothing of this.
+among its inputs. A kernel may therefore have a `prepare`, ``prepare(Float, **parameters) -> tables``, which
+`prepared_by` gives it. Who freezes a function calls `prepare_kernel` before, passes what it returns as an input, and
+calls the kernel as `with_tables` makes it. A kernel without `prepare` knows nothing of this.
 """
 
 import gc

@@ -132,8 +132,8 @@ def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
 def row_and_column(camera: Camera, pixel):
     """Return the rows and columns of pixels, given their numbers, row times width plus column, below 2^31.
 
-    A division of whole numbers by one that the compiler does not know takes as long as ten products. So they are
-    multiplied in float64: of (p + 1/2)/W the rounding is below the distance 1/(2 W) to the next whole number.
+    A division of whole numbers by one that the compiler does not know takes as long as ten products. They are
+    therefore multiplied in float64: the rounding of (p + 1/2)/W is below the distance 1/(2 W) to the next whole number.
     """
     row = mi.UInt32((mi.Float64(pixel) + 0.5) * camera.grid.inverse)
     return row, pixel - row * camera.grid.columns

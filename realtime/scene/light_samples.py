@@ -89,7 +89,7 @@ def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
 
 
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:
-    # What the points have in common is there once: a frame after a light moved makes all arrays again.
+    # Arrays that all points share are made once: a frame after a light moved makes all arrays again.
     intensity = types.color(*aligned_numbers(types.scalar, placed.intensity))
     lift, chord = aligned_numbers(types.scalar, np.array([placed.lift, placed.chord]))
     alike = len(placed.normals) > 1 and bool(np.all(placed.normals == placed.normals[0]))

@@ -49,7 +49,7 @@ class DirectionalExtent:
 
 @dataclass(frozen=True)
 class Facing:
-    """What only a light sample has: how the part of a shape that it stands for faces."""
+    """The direction in which the part of a shape faces that a light sample stands for."""
 
     exact_normal: Any  #: unit normal of the shape, on the side that shines, in float64
     lift: Any  #: how far before the shape rays start, so that they do not meet it [m]

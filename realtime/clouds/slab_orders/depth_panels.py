@@ -91,7 +91,7 @@ class Transport:
                 continue
             cosines = np.abs(mu[self._order[side]])
             weights, fade = panel_weights(np.diff(panels.edges)[::-sign], cosines, panels.nodes.shape[1])
-            # Of the sources, and last of what enters a panel: (P, J, K + 1, K + 1)
+            # The weights of the sources, and in the last row those of light that enters: (P, J, K + 1, K + 1).
             both = np.moveaxis(np.concatenate([weights, fade[:, :, None]], axis=2), 3, 1)
             self._sides.append((sign, side, np.ascontiguousarray(both.astype(number))))
 

@@ -3,8 +3,8 @@
 
 As published (Billeter, Sintorn, Assarsson 2010), a silhouette of what the light sees is joined to what lies behind it
 by triangles across one texel: next to its occluder the shadow begins at the occluder's last sample, far behind it at
-the first sample of the background. What joins them in fact is upright, in a plane through the light, and stands
-somewhere between the two samples. The same error stands along the whole ray, so it does not average out.
+the first sample of the background. The real surface of the shadow is upright there, in a plane through the light,
+and stands somewhere between the two samples. The same error stands along the whole ray, so it does not average out.
 
 Here the place is found. On every side of a texel whose two heights differ by more than `_JUMP` of the larger one, rays
 from the light halve the interval between the samples `_HALVINGS` times, each time keeping the half with the larger

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""The airlight of a source along rays, by the midpoint rule with one visibility test a step and light sample.
 
-Of an area light N points lie in a table. In the orthonormal frame of a point, with its normal for the third axis,
-a ray is o + x d, and all that an integrand needs follows from its three coordinates (a, b, c) at x:
+A table holds the N light samples of an area light. In the orthonormal frame of a light sample, whose normal is the
+third axis, a ray is o + x d, and all that an integrand needs follows from its three coordinates (a, b, c) at x:
 
     r^2 = a^2 + b^2 + c^2,    cos_l = c / r,    cos_scatter = -(o . d + x) / r,
 
-the place in the map too. So a step costs one multiply-add for each coordinate, one square root, one exponential, one
-look-up. A first loop is over the points, a second over the steps: the kernel grows with neither.
+and the place in the map follows too. A step therefore costs one multiply-add for each coordinate, one square root, one
+exponential, one look-up. A first loop is over the points, a second over the steps: the kernel grows with neither.
 
 Uniform steps that no surface ends stop at 20 optical depths, where e^-20 = 2e-9 is left.
 """
@@ -31,7 +31,7 @@ from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 
 @dataclass(frozen=True)
 class SourceState:
-    """What is made of one source when lights or shapes move."""
+    """The state of one source, made again when lights or shapes move."""
 
     frames: LightFrame | None  #: the points of an area light, one a lane
     width: Any  #: of that light, of a square with its mean square extent [m]
@@ -49,7 +49,7 @@ def source_state(
         return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
     frames = light_frames(lights)
     positions, normals = (np.array(rows, dtype=np.float64).T for rows in (frames.position, frames.normal))
-    # Of a square of the side L the mean square distance from the middle is L^2 / 6.
+    # The mean square distance from the middle of a square of the side L is L^2 / 6.
     spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))
     hemispheres = None
     if with_maps:
@@ -60,7 +60,7 @@ def source_state(
 
 @dataclass(frozen=True)
 class Share:
-    """What of an area light each ray takes: one point, with a shift of its steps."""
+    """The part of an area light that each ray takes: one light sample, with a shift of its steps."""
 
     number: Any  #: of the light sample
     shift: Any  #: of the steps, from 0 to 1 of one
