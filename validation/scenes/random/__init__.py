@@ -6,8 +6,8 @@ The scene of seed N is point N of one quasi-random sequence, so the seeds from 0
 Read in this order:
 
 - `design.py`: the names of scenes, the ranges, the sequence of points, and what follows from a point;
-- `media.py`: endless and bounded media, and how bright a light makes them without shadows;
+- `media.py`: unbounded and bounded media, and how bright a light makes them without shadows;
 - `lights.py`: kinds, places and brightness of lights;
-- `casters.py`: solids, plates, fences, screens, cages and meshes that cast shadows, and the floor;
+- `occluders.py`: solids, plates, fences, screens, cages and meshes that cast shadows, and the floor;
 - `scene.py`: a name to the record of a scene, whether light reaches what the camera sees, and Mitsuba's scene.
 """

@@ -2,7 +2,7 @@
 """The design: scene SEED is point SEED of one scrambled Halton sequence, whose beginning covers the ranges evenly.
 
 What a scene has once or may have first (the optical depth, how many lights, the kind of each) is a coordinate of the
-point. What it has many of, such as the places of casters, comes from a stream of random numbers that the seed begins.
+point. What it has many of, such as the places of occluders, comes from a stream of random numbers that the seed begins.
 The scrambling (random permutations of digits, Owen 2017) is the same for all seeds; without it neighbouring
 coordinates of such a sequence are correlated.
 

@@ -6,13 +6,13 @@ sees: a tenth of the scenes would be black else.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from validation.scenes.random.design import Draws, Ranges
-from validation.scenes.random.media import Medium, Ways, optical_depths, unit_airlight
+from validation.scenes.random.media import Medium, optical_depths, unit_airlight, view_rays
 
 Array = NDArray[np.float64]
 
@@ -26,13 +26,13 @@ _CLEAR = 0.19  # around the camera nothing of a light is nearer, in radii of the
 
 @dataclass(frozen=True)
 class Light:
-    """A light in radii of the stage."""
+    """A light, first in radii of the stage, then in metres."""
 
     name: str
     kind: str  #: 'point', 'spot', 'directional' or one of `AREA_KINDS`
     position: Array  #: of a directional light a point on its way
     target: Array  #: a point at which it shines
-    colour: Array  #: intensity, irradiance, or radiance, for a stage of radius 1
+    colour: Array  #: intensity, irradiance, or radiance
     brightness: float  #: of the airlight that it makes in the middle of the image without shadows [W/(m^2 sr)]
     size: tuple[float, ...] = ()  #: radius, or half of both sides
     cutoff: float = 0.0  #: of a spot, half angle [degrees]
@@ -44,26 +44,41 @@ class Light:
         """The radius of the ball around what shines."""
         return math.hypot(*self.size) if self.kind == "rectangle" else max(self.size, default=0.0)
 
+    def placed(self, scale: float, centre: Array) -> "Light":
+        """Return the light in a stage of a radius and a centre [m].
 
-def draw_lights(draws: Draws, ranges: Ranges, media: list[Medium], camera: Array, seen: Ways) -> list[Light]:
+        Extinction is over a length, so a stage twice as large scatters as much, and its light comes from twice as far:
+        intensity [W/sr] grows with the square, radiance and irradiance stay.
+        """
+        return replace(
+            self,
+            position=centre + scale * self.position,
+            target=centre + scale * self.target,
+            colour=self.colour * (scale**2 if self.kind in ("point", "spot") else 1.0),
+            size=tuple(scale * value for value in self.size),
+        )
+
+
+def draw_lights(draws: Draws, ranges: Ranges, media: list[Medium], camera: Array, target: Array) -> list[Light]:
     """Return the lights of a scene; their brightness is that on the rays of the camera."""
-    endless = any(medium.bounds == "endless" for medium in media)
-    kinds = ranges["light_kinds"] | ({"directional": 0.0} if endless else {})
+    rays = view_rays(camera, target)
+    unbounded = any(medium.bounds == "unbounded" for medium in media)
+    kinds = ranges["light_kinds"] | ({"directional": 0.0} if unbounded else {})
     kinds = kinds if any(kinds.values()) else {"point": 1.0}
     return [
-        _light(draws, ranges, draws.pick(kinds, f"light_kind-{number}"), number, media, camera, seen)
+        _light(draws, ranges, draws.pick(kinds, f"light_kind-{number}"), number, media, camera, rays)
         for number in range(1, draws.few(*ranges["lights"], name="lights") + 1)
     ]
 
 
 def _light(
-    draws: Draws, ranges: Ranges, kind: str, number: int, media: list[Medium], camera: Array, seen: Ways
+    draws: Draws, ranges: Ranges, kind: str, number: int, media: list[Medium], camera: Array, rays: Array
 ) -> Light:
     stream = draws.of(f"light-{number}")
     size = _size(draws, stream, ranges, kind, number)
     ball = math.hypot(*size) if kind == "rectangle" else max(size, default=0.0)
     # Where the camera sees light best: the middle of the stage, or nearer in thick fog.
-    ahead = _ahead(media, camera, seen)
+    ahead = _ahead(media, camera, rays[0])
     for attempt in range(_TRIES):
         first = draws if attempt == 0 else stream
         elevation = math.asin(
@@ -81,7 +96,7 @@ def _light(
             distance = first.logarithmic(*ranges["light_distance"], name=f"light_distance-{number}")
             position = _nearer(media, camera, ahead, (distance + ball) * direction)
         target = (ahead if attempt % 2 == 0 else np.zeros(3)) + 0.29 * stream.in_ball()
-        unit = unit_airlight(media, seen, position, directional=kind == "directional")
+        unit = unit_airlight(media, camera, rays, position, directional=kind == "directional")
         if np.linalg.norm(position - camera) > ball + _CLEAR and unit > 0 and math.log(unit) > -_DEEPEST - 9:
             break
     colour = np.array([stream.between(0.53, 1.0) for _ in range(3)])
@@ -107,9 +122,8 @@ def _size(draws: Draws, stream: Draws, ranges: Ranges, kind: str, number: int) -
     return (size, size * stream.between(0.23, 0.97)) if kind == "rectangle" else (size,)
 
 
-def _ahead(media: list[Medium], camera: Array, seen: Ways) -> Array:
+def _ahead(media: list[Medium], camera: Array, axis: Array) -> Array:
     """Return a point on the axis of the camera, the middle of the stage or where the optical depth is about 2."""
-    axis = seen.directions[0]
     far = float(np.linalg.norm(camera))
     for share in (1.0, 0.83, 0.67, 0.51, 0.37, 0.23, 0.13):
         point = camera + share * far * axis

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Media of random scenes, an endless one, bounded ones or both, and how bright a light makes them without shadows.
+"""Media of random scenes, an unbounded one, bounded ones or both, and how bright a light makes them without shadows.
 
 Bounds are convex bodies within a ball. Of each the radius of a ball inside of it is known: where the camera shall be
 in a medium it is in that ball. The balls around bounds are disjoint.
@@ -9,7 +9,7 @@ does. Shadows and bounds are approximations there; nothing but the exposure of t
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +29,11 @@ _NEAR = 0.07  # light spreads from a ball of this radius at least, in radii of t
 
 @dataclass(frozen=True)
 class Medium:
-    """A medium in radii of the stage."""
+    """A medium, first in radii of the stage, then in metres."""
 
     name: str
-    bounds: str  #: 'endless', 'sphere', 'box', 'gem' or 'ellipsoid'
-    sigma_t: Array  #: RGB, one over a radius of the stage
+    bounds: str  #: 'unbounded', 'sphere', 'box', 'gem' or 'ellipsoid'
+    sigma_t: Array  #: RGB, one over a length
     grey: bool  #: whether the three are one
     albedo: Array
     phase: str  #: words of the phase function, such as 'isotropic', 'hg:0.31' and 'hazy'
@@ -49,17 +49,22 @@ class Medium:
         around, within = _BALLS[self.bounds]
         return 0.5 * (around * float(self.half.max()) + within * float(self.half.min()))
 
+    def placed(self, scale: float, centre: Array) -> "Medium":
+        """Return the medium in a stage of a radius and a centre [m]."""
+        place = centre + scale * self.centre
+        return replace(self, sigma_t=self.sigma_t / scale, centre=place, half=scale * self.half)
+
 
 def draw_media(draws: Draws, ranges: Ranges, camera: Array) -> list[Medium]:
-    """Return the media around a camera, an endless one first."""
+    """Return the media around a camera, an unbounded one first."""
     kind = draws.pick(ranges["media"], "media")
     inside = draws.pick(ranges["camera_inside"], "camera_inside") == "yes"
     media = []
     if kind != "bounded":
         depth = draws.logarithmic(*ranges["optical_depth"], name="optical_depth")
         filling = _filling(draws, draws.of("endless"), ranges, depth / (float(np.linalg.norm(camera)) + 1))
-        media.append(Medium("endless", "endless", *filling, depth, True))
-    if kind != "endless":
+        media.append(Medium("unbounded", "unbounded", *filling, depth, True))
+    if kind != "unbounded":
         fewest, most = ranges["bounded_media"]
         count = round(draws.between(fewest - 0.49, most + 0.49, name="bounded_media"))
         media += _bounded(draws, ranges, camera, count=count, inside=inside, first=not media)
@@ -130,58 +135,48 @@ def optical_depths(media: list[Medium], start: Array, end: Array) -> Array:
     depth = np.zeros((*length.shape, 3))
     outside = length.copy()
     for medium in media:
-        if medium.bounds != "endless":
+        if medium.bounds != "unbounded":
             inside = chord(medium.centre, medium.ball, start, way, length)
             outside -= inside
             depth += inside[..., None] * medium.sigma_t
     for medium in media:
-        if medium.bounds == "endless":
+        if medium.bounds == "unbounded":
             depth += np.maximum(outside, 0)[..., None] * medium.sigma_t
     return depth
 
 
-@dataclass(frozen=True)
-class Ways:
-    """Points along some rays of the camera, in radii of the stage, and what light scattered there comes through."""
-
-    points: Array  #: (rays, steps, 3)
-    directions: Array  #: (rays, 3)
-    weights: Array  #: length of the steps times the transmittance to the camera, (rays, steps, 3)
-
-
-def ways(media: list[Medium], camera: Array, target: Array, reach: float) -> Ways:
-    """Return five rays about the middle of the image, each up to `reach` radii of the stage."""
+def view_rays(camera: Array, target: Array) -> Array:
+    """Return the directions of five rays about the middle of the image, which is the first, (5, 3)."""
     forward = (target - camera) / np.linalg.norm(target - camera)
     left = np.cross(forward, [0.0, 0.0, 1.0])
     left /= np.linalg.norm(left)
     up = np.cross(left, forward)
     directions = np.stack([forward, *(forward + 0.13 * side for side in (left, -left, up, -up))])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    edges = reach * (np.arange(_STEPS + 1) / _STEPS) ** 2
-    middle, lengths = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
-    points = camera + middle[:, None] * directions[:, None]
-    depth = optical_depths(media, np.broadcast_to(camera, points.shape), points)
-    return Ways(points, directions, lengths[:, None] * np.exp(-depth))
+    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
-def unit_airlight(media: list[Medium], seen: Ways, light: Array, *, directional: bool) -> float:
-    """Return the largest airlight of a light of unit intensity over rays and channels.
+def unit_airlight(media: list[Medium], camera: Array, directions: Array, light: Array, *, directional: bool) -> float:
+    """Return the largest airlight of a light of unit intensity over rays of the camera and channels.
 
     A directional light, of unit irradiance, does not spread; it comes from a point very far away.
     """
-    toward = light - seen.points
+    edges = (float(np.linalg.norm(camera)) + 1.0) * (np.arange(_STEPS + 1) / _STEPS) ** 2
+    middle, lengths = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
+    points = camera + middle[:, None] * directions[:, None]
+    left = np.exp(-optical_depths(media, np.broadcast_to(camera, points.shape), points))
+    toward = light - points
     distance = np.linalg.norm(toward, axis=-1)
-    depth = optical_depths(media, seen.points, np.broadcast_to(light, seen.points.shape))
+    depth = optical_depths(media, points, np.broadcast_to(light, points.shape))
     spread = np.ones_like(distance) if directional else 1 / np.maximum(distance, _NEAR) ** 2
-    cosine = -np.sum(toward * seen.directions[:, None], axis=-1) / np.maximum(distance, 1e-12)
-    total = np.zeros(seen.points.shape)
+    cosine = -np.sum(toward * directions[:, None], axis=-1) / np.maximum(distance, 1e-12)
+    total = np.zeros(points.shape)
     taken = np.zeros(distance.shape, dtype=bool)
-    for medium in sorted(media, key=lambda each: each.bounds == "endless"):
+    for medium in sorted(media, key=lambda each: each.bounds == "unbounded"):
         inside = (
-            np.linalg.norm(seen.points - medium.centre, axis=-1) < medium.ball if medium.bounds != "endless" else ~taken
+            np.linalg.norm(points - medium.centre, axis=-1) < medium.ball if medium.bounds != "unbounded" else ~taken
         )
         inside &= ~taken
         taken |= inside
         phase = phase_from_words(medium.phase)(np.clip(cosine, -1, 1)) / (4 * np.pi)
         total += (inside * phase * spread)[..., None] * (medium.sigma_t * medium.albedo)
-    return float((total * np.exp(-depth) * seen.weights).sum(axis=1).max())
+    return float((total * np.exp(-depth) * lengths[:, None] * left).sum(axis=1).max())

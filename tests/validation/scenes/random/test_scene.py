@@ -13,11 +13,11 @@ from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_reference
 from reference.storage.scene_digest import scene_digest
 from validation.scenes.loading import load_scene
-from validation.scenes.meshes import grid, rotation
+from validation.scenes.meshes import grid
 from validation.scenes.parts import mitsuba_mesh
 from validation.scenes.random.design import COORDINATES, LARGEST_SEED, Draws, point, ranges_from
 from validation.scenes.random.lights import Light
-from validation.scenes.random.scene import Camera, draw_stage, drawn_values, reach
+from validation.scenes.random.scene import draw_scene, drawn_values, with_reach
 
 
 @pytest.mark.claim("random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn")
@@ -29,14 +29,14 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
         ours, reference = read_scene(loaded.scene), read_reference(loaded.scene)
         assert len(ours.lights) + len(ours.area_lights) == len(drawn["lights"])
         assert len(reference.lights) + len(reference.area) + len(reference.directional) == len(drawn["lights"])
-        bounded = [medium for medium in drawn["media"] if medium["bounds"] != "endless"]
+        bounded = [medium for medium in drawn["media"] if medium["bounds"] != "unbounded"]
         assert len(reference.media) == len(bounded)
         assert ours.features.clear == (len(bounded) == len(drawn["media"]))
         # What was drawn arrives, to the precision of the scene, single.
-        sigma = {medium.name: medium.sigma_t for medium in reference.media} | {"endless": reference.medium.sigma_t}
+        sigma = {medium.name: medium.sigma_t for medium in reference.media} | {"unbounded": reference.medium.sigma_t}
         for medium in drawn["media"]:
-            np.testing.assert_allclose(sigma[medium["name"]], np.divide(medium["sigma_t"], drawn["scale"]), rtol=1e-6)
-        assert len(reference.occluders.shapes()) >= len(drawn["casters"])
+            np.testing.assert_allclose(sigma[medium["name"]], medium["sigma_t"], rtol=1e-6)
+        assert len(reference.occluders.shapes()) >= len(drawn["occluders"])
 
 
 @pytest.mark.claim("random-same", tolerance="none: the digests of two loads, and of the record kept here, are equal")
@@ -47,10 +47,8 @@ def test_the_same_seed_is_the_same_scene(variant):
     words = hashlib.sha256()
     for seed in range(8):
         drawn = drawn_values(f"random:{seed}")
-        scale, x = drawn["scale"], drawn["centre"][0]
-        places = [f"{light['kind']} {x + scale * light['position'][0]:.6g}" for light in drawn["lights"]]
-        words.update(",".join(places).encode())
-        words.update(",".join(f"{each['kind']} {scale * each['radius']:.6g}" for each in drawn["casters"]).encode())
+        words.update(",".join(f"{each['kind']} {each['position'][0]:.6g}" for each in drawn["lights"]).encode())
+        words.update(",".join(f"{each['kind']} {each['radius']:.6g}" for each in drawn["occluders"]).encode())
     assert words.hexdigest()[:16] == KEPT
 
 
@@ -82,7 +80,7 @@ def test_the_first_points_cover_every_coordinate(points):
 
 def test_a_seed_has_one_point_and_parts_have_streams_of_their_own():
     assert point(5) == point(5) != point(6)
-    first, again, other = Draws(5).of("lights"), Draws(5).of("lights"), Draws(5).of("casters")
+    first, again, other = Draws(5).of("lights"), Draws(5).of("lights"), Draws(5).of("occluders")
     numbers = [first.share() for _ in range(4)]
     assert numbers == [again.share() for _ in range(4)]
     assert numbers != [other.share() for _ in range(4)]
@@ -100,12 +98,12 @@ def test_a_seed_that_no_scene_has_is_refused(seed):
 @pytest.mark.claim("random-ranges", tolerance="none: what is drawn lies within the range")
 def test_what_is_set_is_drawn():
     ranges = ranges_from(
-        {"optical_depth": [0.5, 0.7], "lights": 2, "light_kinds": {"spot": 1}, "media": {"endless": 1}}
+        {"optical_depth": [0.5, 0.7], "lights": 2, "light_kinds": {"spot": 1}, "media": {"unbounded": 1}}
     )
     for seed in range(12):
-        drawn = draw_stage(seed, ranges)
+        drawn = draw_scene(seed, ranges)
         assert [light.kind for light in drawn.lights] == ["spot", "spot"]
-        assert [medium.bounds for medium in drawn.media] == ["endless"]
+        assert [medium.bounds for medium in drawn.media] == ["unbounded"]
         assert 0.5 <= drawn.media[0].optical_depth <= 0.7
 
 
@@ -131,43 +129,40 @@ SEEDS = range(300)
 
 @pytest.fixture(scope="module")
 def scenes():
-    return [draw_stage(seed, ranges_from({})) for seed in SEEDS]
+    return [draw_scene(seed, ranges_from({})) for seed in SEEDS]
 
 
-def _clearance(caster, place):
-    return np.linalg.norm(np.subtract(caster.position, place)) - caster.radius
+def _clearance(occluder, place):
+    return np.linalg.norm(np.subtract(occluder.position, place)) - occluder.radius
 
 
-@pytest.mark.claim("random-clear", tolerance="none: the balls around casters hold neither")
-def test_no_caster_holds_the_camera_or_a_light_unless_meant_to(scenes):
+@pytest.mark.claim("random-clear", tolerance="none: the balls around occluders hold neither")
+def test_no_occluder_holds_the_camera_or_a_light_unless_meant_to(scenes):
     for drawn in scenes:
-        for caster in drawn.casters:
-            if caster.kind in ("floor", "wall", "room"):
+        for occluder in drawn.occluders:
+            if occluder.kind in ("floor", "wall", "room"):
                 continue
-            assert _clearance(caster, drawn.camera.origin) > 0, drawn.seed
+            assert _clearance(occluder, drawn.origin) > 0, drawn.seed
             for light in drawn.lights:
-                caged = caster.kind == "cage" and np.all(caster.position == light.position)
-                assert caged or _clearance(caster, light.position) > 0, (drawn.seed, caster.name, light.name)
+                caged = occluder.kind == "cage" and np.all(occluder.position == light.position)
+                assert caged or _clearance(occluder, light.position) > 0, (drawn.seed, occluder.name, light.name)
 
 
-def test_all_lie_on_one_side_of_floor_and_wall(scenes):
+def test_all_lie_before_floor_wall_and_room(scenes):
     for drawn in scenes:
         near = [light.position for light in drawn.lights if light.kind != "directional"]
-        for caster in drawn.casters:
-            if caster.kind in ("floor", "wall"):
-                normal = rotation(*caster.turn) @ [0, 0, 1]
-                for place in (drawn.camera.origin, *near):
-                    assert np.subtract(place, caster.position) @ normal > 0, drawn.seed
-            if caster.kind == "room":
-                for place in (drawn.camera.origin, *near):
-                    own = rotation(*caster.turn).T @ np.subtract(place, caster.position)
-                    assert np.all(np.abs(own) < caster.mesh[0].max(axis=0) * caster.radius), drawn.seed
+        for occluder in drawn.occluders:
+            if occluder.kind in ("floor", "wall", "room"):
+                vertices, faces = occluder.mesh
+                a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+                for place in (drawn.origin, *near):
+                    assert np.all(np.sum((place - a) * np.cross(b - a, c - a), axis=1) > 0), drawn.seed
 
 
 @pytest.mark.claim("random-not-round", tolerance="no number has fewer than four digits after the first in 300 scenes")
 def test_no_number_is_round(scenes):
     for drawn in scenes:
-        numbers = [drawn.scale, *drawn.centre, *drawn.camera.origin, drawn.camera.fov]
+        numbers = [drawn.scale, *drawn.centre, *drawn.origin, drawn.fov]
         for medium in drawn.media:
             numbers += [*medium.sigma_t, *medium.albedo]
         for light in drawn.lights:
@@ -177,16 +172,16 @@ def test_no_number_is_round(scenes):
 
 
 def found(*meshes):
-    """What light reaches of a stage about the origin of radius 1 under a lamp, with casters."""
-    camera = Camera(np.array([0.0, -4.0, 0.1]), np.zeros(3), 47.0, "endless", False)
+    """What light reaches of a stage about the origin of radius 1 under a lamp, with occluders."""
+    camera = {"origin": np.array([0.0, -4.0, 0.1]), "target": np.zeros(3), "fov": 47.0}
     lamp = Light("light-1", "point", np.array([0.0, 0.3, 5.0]), np.zeros(3), np.ones(3), 1.0)
-    drawn = draw_stage(0, ranges_from({}))
-    stage = replace(drawn, centre=np.zeros(3), scale=1.0, camera=camera, lights=(lamp,))
-    shapes = {f"caster-{number}": mitsuba_mesh("caster", mesh, (0.5,) * 3) for number, mesh in enumerate(meshes)}
-    return reach(stage, mi.load_dict({"type": "scene"} | shapes))
+    drawn = draw_scene(0, ranges_from({}))
+    drawn = replace(drawn, centre=np.zeros(3), scale=1.0, lights=(lamp,), **camera)
+    shapes = {f"occluder-{number}": mitsuba_mesh("occluder", mesh, (0.5,) * 3) for number, mesh in enumerate(meshes)}
+    return with_reach(drawn, mi.load_dict({"type": "scene"} | shapes))
 
 
-def test_without_casters_all_is_lit(variant):
+def test_without_occluders_all_is_lit(variant):
     without = found()
     assert (without.lit, without.near, without.camera_lit) == (1.0, 0.0, True)
     assert without.enough

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Casters: what casts shadows, and the floor, wall or room that receives them.
+"""Occluders: what casts shadows, and the floor, wall or room that receives them.
 
 All lie within a ball, and no ball holds a light or the camera. But a cage is about a light, and the ground is drawn
 around all else.
@@ -7,7 +7,7 @@ around all else.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mitsuba as mi
@@ -39,58 +39,64 @@ from validation.scenes.random.lights import Light
 Array = NDArray[np.float64]
 
 _TRIES = 24
-_CAMERA = 0.31  # a caster is as far from the camera at least, in radii of the stage
+_CAMERA = 0.31  # an occluder is as far from the camera at least, in radii of the stage
 _LIGHT = 0.023  # and as far from a light
 _SCREENS = ("fence", "pierced", "sheet", "plate")
 
 
 @dataclass(frozen=True)
-class Caster:
-    """A shape that casts shadows, in radii of the stage."""
+class Occluder:
+    """A shape that casts shadows, first in radii of the stage, then in metres."""
 
-    kind: str  #: of `caster_kinds` in the ranges, 'ball', 'cage', 'floor', 'wall' or 'room'
-    mesh: Mesh = field(repr=False)  #: within the unit ball; a ball is Mitsuba's sphere in its place
-    position: Array  #: of the middle of the ball
+    kind: str  #: of `occluder_kinds` in the ranges, 'ball', 'cage', 'floor', 'wall' or 'room'
+    mesh: Mesh = field(repr=False)  #: where it is; a ball is Mitsuba's sphere in its place
+    position: Array  #: of the middle of the ball around it
     radius: float  #: of the ball
-    turn: tuple[Array, float]  #: axis and angle [degrees]
     reflectance: Array
     name: str = ""
 
-    @property
-    def placed(self) -> Mesh:
-        """The mesh where it is."""
-        return placed(scaled(self.mesh, self.radius), self.position, rotation(*self.turn))
+    def placed(self, scale: float, centre: Array) -> "Occluder":
+        """Return the occluder in a stage of a radius and a centre [m]."""
+        mesh = placed(scaled(self.mesh, scale), centre)
+        return replace(self, mesh=mesh, position=centre + scale * self.position, radius=scale * self.radius)
 
 
-def draw_casters(
+def _placed(
+    kind: str, mesh: Mesh, position: Array, radius: float, turn: tuple[Array, float], colour: Array
+) -> Occluder:
+    """Return an occluder of a mesh within the unit ball; `turn`: axis and angle [degrees]."""
+    return Occluder(kind, placed(scaled(mesh, radius), position, rotation(*turn)), position, radius, colour)
+
+
+def draw_occluders(
     draws: Draws, ranges: Ranges, camera: Array, lights: Sequence[Light], *, in_shadow: bool
-) -> list[Caster]:
-    """Return the casters of a scene, and perhaps a plate that keeps the first light from the camera."""
+) -> list[Occluder]:
+    """Return the occluders of a scene, and perhaps a plate that keeps the first light from the camera."""
     files = _files(ranges["meshes"])
-    kinds = {kind: weight for kind, weight in ranges["caster_kinds"].items() if kind != "mesh" or files}
+    kinds = {kind: weight for kind, weight in ranges["occluder_kinds"].items() if kind != "mesh" or files}
     kinds = kinds if any(kinds.values()) else {"box": 1.0}
-    casters = [_shade(draws.of("shade"), camera, lights[0])] if in_shadow else []
+    occluders = [_shade(draws.of("shade"), camera, lights[0])] if in_shadow else []
     if draws.pick(ranges["cages"], "cages") == "yes":
         near = [light for light in lights if light.kind != "directional"]
-        casters += [_cage(draws.of("cage"), camera, near[0])] if near else []
-    count = draws.count(*ranges["casters"], name="casters")
-    size = draws.logarithmic(*ranges["caster_size"], name="caster_size")
+        occluders += [_cage(draws.of("cage"), camera, near[0])] if near else []
+    count = draws.count(*ranges["occluders"], name="occluders")
+    size = draws.logarithmic(*ranges["occluder_size"], name="occluder_size")
     for number in range(1, count + 1):
         stream = draws.of(f"caster-{number}")
-        kind = draws.pick(kinds, f"caster_kind-{number}")
+        kind = draws.pick(kinds, f"occluder_kind-{number}")
         if number == 1 and draws.pick(ranges["spheres"], "spheres") == "yes":
             kind = "ball"
         for _ in range(_TRIES):
             position, radius = _place(stream, ranges, kind, size, lights)
             if _is_clear(position, radius, camera, lights):
-                casters.append(_caster(stream, kind, position, radius, files))
+                occluders.append(_occluder(stream, kind, position, radius, files))
                 break
-    return casters
+    return occluders
 
 
 def _place(stream: Draws, ranges: Ranges, kind: str, size: float, lights: Sequence[Light]) -> tuple[Array, float]:
-    """Return a place for a caster: in the stage, or for a screen before a light too."""
-    low, high = ranges["caster_size"]
+    """Return a place for an occluder: in the stage, or for a screen before a light too."""
+    low, high = ranges["occluder_size"]
     radius = min(max(size * stream.logarithmic(0.41, 2.43), low), high)
     if kind in _SCREENS and stream.share() < 0.4:
         light = lights[int(stream.share() * len(lights))]
@@ -107,13 +113,13 @@ def _is_clear(position: Array, radius: float, camera: Array, lights: Sequence[Li
     return all(np.linalg.norm(position - light.position) > radius + light.ball + _LIGHT for light in lights)
 
 
-def _caster(stream: Draws, kind: str, position: Array, radius: float, files: Sequence[Path]) -> Caster:
+def _occluder(stream: Draws, kind: str, position: Array, radius: float, files: Sequence[Path]) -> Occluder:
     reflectance = np.array([stream.between(0.07, 0.83) for _ in range(3)])
     upright = kind in ("fence", "vase", "pierced")
     axis = stream.vector() + (np.array([0.0, 0.0, 4.0]) if upright else 0)
     angle = stream.between(3.0, 357.0)
     turn = axis / np.linalg.norm(axis), angle
-    return Caster(kind, _solid(stream, kind, files), position, radius, turn, reflectance)
+    return _placed(kind, _solid(stream, kind, files), position, radius, turn, reflectance)
 
 
 def _solid(stream: Draws, kind: str, files: Sequence[Path]) -> Mesh:
@@ -195,7 +201,7 @@ def _files(folder: str) -> list[Path]:
     return files
 
 
-def _shade(stream: Draws, camera: Array, light: Light) -> Caster:
+def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
     """Return a plate between the camera and a light, across the way."""
     way = light.position - camera
     length = float(np.linalg.norm(way))
@@ -210,10 +216,10 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Caster:
     reflectance = np.array([stream.between(0.07, 0.53) for _ in range(3)])
     half = 0.69 + 0.03 * stream.share()
     mesh = box((2 * half, 2 * math.sqrt(1 - half**2), 2 * stream.logarithmic(0.0017, 0.031)))
-    return Caster("plate", mesh, position, radius, (axis, angle), reflectance)
+    return _placed("plate", mesh, position, radius, (axis, angle), reflectance)
 
 
-def _cage(stream: Draws, camera: Array, light: Light) -> Caster:
+def _cage(stream: Draws, camera: Array, light: Light) -> Occluder:
     """Return upright bars around a light."""
     most = float(np.linalg.norm(light.position - camera)) - _CAMERA
     radius = max(min(max(stream.between(0.13, 0.31), 2.1 * light.ball), most), 1.3 * light.ball)
@@ -222,7 +228,7 @@ def _cage(stream: Draws, camera: Array, light: Light) -> Caster:
     angles = 2 * np.pi * np.arange(bars) / bars
     mesh = joined([placed(bar, (0.71 * np.cos(angle), 0.71 * np.sin(angle), 0.0)) for angle in angles])
     reflectance = np.array([stream.between(0.07, 0.61) for _ in range(3)])
-    return Caster("cage", mesh, light.position, radius, (stream.vector(), stream.between(3.0, 357.0)), reflectance)
+    return _placed("cage", mesh, light.position, radius, (stream.vector(), stream.between(3.0, 357.0)), reflectance)
 
 
 def turning(start: Array, end: Array) -> tuple[Array, float]:
@@ -235,8 +241,8 @@ def turning(start: Array, end: Array) -> tuple[Array, float]:
 
 
 def draw_ground(
-    draws: Draws, ranges: Ranges, camera: Array, lights: Sequence[Light], casters: Sequence[Caster]
-) -> list[Caster]:
+    draws: Draws, ranges: Ranges, camera: Array, lights: Sequence[Light], occluders: Sequence[Occluder]
+) -> list[Occluder]:
     """Return a floor, a floor and a wall, a room around all, or nothing."""
     stream = draws.of("ground")
     kind = draws.pick(ranges["grounds"], "grounds")
@@ -247,7 +253,7 @@ def draw_ground(
         kind = "floor-and-wall"
     near = [light for light in lights if light.kind != "directional"]
     balls = [(camera, 0.13), *((light.position, light.ball + 0.07) for light in near)]
-    balls += [(caster.position, 0.31 * caster.radius) for caster in casters]
+    balls += [(occluder.position, 0.31 * occluder.radius) for occluder in occluders]
     if kind == "room":
         return [_room(stream, balls)]
     tilt = stream.vector() * stream.between(0.01, 0.11) + np.array([0.0, 0.0, 1.0])
@@ -263,7 +269,7 @@ def draw_ground(
     return ground
 
 
-def _plane(stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array, float]]) -> Caster:
+def _plane(stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array, float]]) -> Occluder:
     """Return a rectangle below all balls as its normal has it."""
     lowest = min(float(position @ normal) - radius for position, radius in balls)
     lowest = min(lowest, -0.43) - stream.between(0.003, 0.11)
@@ -271,10 +277,10 @@ def _plane(stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array,
     turn = turning(np.array([0.0, 0.0, 1.0]), normal)
     reflectance = np.array([stream.between(0.11, 0.71) for _ in range(3)])
     half = stream.between(0.71, 1.0), stream.between(0.71, 1.0)
-    return Caster(kind, _rectangle(half), lowest * normal, extent, turn, reflectance)
+    return _placed(kind, _rectangle(half), lowest * normal, extent, turn, reflectance)
 
 
-def _room(stream: Draws, balls: Sequence[tuple[Array, float]]) -> Caster:
+def _room(stream: Draws, balls: Sequence[tuple[Array, float]]) -> Occluder:
     """Return a closed room, seen from inside, around all balls; its floor is level but for a few degrees."""
     low = np.min([position - radius for position, radius in balls], axis=0) - stream.between(0.11, 0.31)
     high = np.max([position + radius for position, radius in balls], axis=0) + stream.between(0.11, 0.31)
@@ -284,7 +290,7 @@ def _room(stream: Draws, balls: Sequence[tuple[Array, float]]) -> Caster:
     reflectance = np.array([stream.between(0.11, 0.61) for _ in range(3)])
     vertices, faces = box(2 * half / radius)
     turn = axis, stream.between(0.3, 2.3)
-    return Caster("room", (vertices, faces[:, ::-1]), 0.5 * (low + high), radius, turn, reflectance)
+    return _placed("room", (vertices, faces[:, ::-1]), 0.5 * (low + high), radius, turn, reflectance)
 
 
 def _user_mesh(path: Path) -> Mesh:
