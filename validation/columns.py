@@ -11,10 +11,13 @@ A value within a record within a record has a key with dots, the path of the val
 
 import types
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from functools import cache
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+import numpy as np
+
+_Record = TypeVar("_Record")
 _COLUMN = "column"
 _KINDS = {str: "string", int: "int64", float: "float64", bool: "bool", bytes: "binary"}
 
@@ -61,6 +64,33 @@ def flat(data: Mapping[str, Any]) -> dict[str, Any]:
         else:
             values[str(key)] = value
     return values
+
+
+def plain(value: Any) -> Any:
+    """Return dataclasses, containers and numbers as JSON holds them: no NumPy types, None for what is not finite."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def record_of(data: Any, kind: type[_Record]) -> _Record:
+    """Return a record of plain data, or of values by name; keys that it does not know are passed over.
+
+    Raises `msgspec.ValidationError` for what does not fit its types.
+    """
+    import msgspec
+
+    return msgspec.convert(plain(data), kind)
 
 
 def _columns(record: Any, prefix: str) -> Iterator[Column]:

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from reports.commands.list import list_
-from reports.data import records
-from reports.data.reader import meanings
+from reports.data.reader import meanings, record_types
 from reports.tables.drawing import markdown
 from reports.tables.table import Name, Row, Table
 
@@ -181,6 +180,7 @@ def report_keys(*parts: str) -> str:
     """Return tables of the keys of parts of `report.json`, or of the file itself, from its records."""
     found = []
     for part in parts or ("report",):
-        rows = [(f"`{name}`", what) for name, what in meanings(getattr(records, part.capitalize()), units=True).items()]
-        found.append((f"**{part}**\n\n" if parts else "") + table(("key", "what it is"), rows, 2))
+        record = record_types()[part.title().replace("-", "")]
+        rows = [(f"`{name}`", what) for name, what in meanings(record, units=True).items()]
+        found.append((f"**{part.replace('-', ' ')}**\n\n" if parts else "") + table(("key", "what it is"), rows, 2))
     return "\n".join(found)

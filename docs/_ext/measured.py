@@ -12,12 +12,14 @@ from listed import table
 from shown import scene_picture
 
 from reports.data import records
-from reports.data.reader import record_of
 from reports.tables.agreement import left_out_table
 from reports.tables.drawing import markdown
 from reports.tables.kernels import cost_table
 from reports.tables.methods import COLUMNS, fastest_table, method_row
 from reports.tables.table import Column, Name, Row, Table, number
+from validation.columns import record_of
+from validation.kernels.records import KernelCost
+from validation.statistics.records import Fraction, MultipleScattering
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 _METHOD = ("frame", "light_moved", "relative_rmse", "relative_bias", "p99", "max")
@@ -32,7 +34,7 @@ class KeptScene:
     plan: Mapping[str, str]
     counts: Mapping[str, int]
     reference: records.Reference
-    multiple: records.Multiple
+    multiple: MultipleScattering
     methods: tuple[records.MethodRow, ...]
 
 
@@ -122,10 +124,10 @@ def kernel_costs(phase: str) -> str:
     if kernels is None:
         return "No costs of kernels are at hand: `airlight study kernels` measures them."
     costs = []
-    for cost in kernels["costs"]:
-        default = next(iter(KERNELS[cost["family"]].parameters.values()), None) if cost["family"] in KERNELS else None
-        if cost["phase"] == phase and cost["size"] in (default, None):
-            costs.append(cost | {"device": cost["device"] or cost["wall"]})
+    for cost in (record_of(each, KernelCost) for each in kernels["costs"]):
+        default = next(iter(KERNELS[cost.family].parameters.values()), None) if cost.family in KERNELS else None
+        if cost.phase == phase and cost.size in (default, None):
+            costs.append(replace(cost, device=cost.time))
     return markdown(cost_table("", costs, code=True).only("kernel", "device", "median", "p99", "max"))
 
 
@@ -136,7 +138,7 @@ def left_out() -> str:
     return markdown(replace(shares.only(*keys), title=""))
 
 
-def _share(share: records.Share) -> str:
+def _share(share: Fraction) -> str:
     low, high = (100 * end for end in share.interval)
     return f"{100 * share.value:.1f} % ({low:.1f}..{high:.1f})"
 

@@ -31,8 +31,8 @@ from reports.plotting.pictures import (
 )
 from reports.tables.methods import rate_words
 from reports.tables.record import Result
-from validation.metrics.errors import plain
-from validation.study.frame_times import FrameTimes
+from validation.columns import plain
+from validation.timing import FrameTimes
 
 Array = NDArray[np.floating]
 _NOTHING = "nothing written"

@@ -4,15 +4,13 @@
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path, PureWindowsPath
-from typing import Any, TypeVar
+from typing import Any, get_args, get_type_hints
 
 from analytic.errors import InputError
-from reports.data import records
 from reports.data.records import SCHEMA, Report
-
-Record = TypeVar("Record")
+from validation.columns import record_of
 
 
 def read_report(path: Path | str) -> Report:
@@ -31,13 +29,6 @@ def read_report(path: Path | str) -> Report:
         words, _, place = str(error).partition(" - at `$")
         where = f"report{place.rstrip('`')}"
         raise InputError(f"{file} does not keep to {SCHEMA}: {where}: {words}; make the report again") from None
-
-
-def record_of(data: Any, kind: type[Record]) -> Record:
-    """Return what JSON holds as a record; keys that it does not know are passed over."""
-    import msgspec
-
-    return msgspec.convert(data, kind)
 
 
 def load_report(path: Path | str) -> tuple[Report, Path]:
@@ -93,11 +84,20 @@ def schema() -> dict[str, Any]:
     """Return the JSON Schema of report.json, with the meaning of each key."""
     import msgspec
 
-    made = msgspec.json.schema(Report)
+    made, kinds = msgspec.json.schema(Report), record_types()
     for name, shown in made["$defs"].items():
-        for key, meaning in meanings(getattr(records, name), units=True).items():
+        for key, meaning in meanings(kinds[name], units=True).items():
             shown["properties"][key] = {**shown["properties"][key], "description": meaning}
     return made
+
+
+def record_types(kind: Any = Report) -> dict[str, type]:
+    """Return the classes of a record and of those within it, by name."""
+    found: dict[str, type] = {kind.__name__: kind} if isinstance(kind, type) and is_dataclass(kind) else {}
+    inside = get_type_hints(kind).values() if found else get_args(kind)
+    for each in inside:
+        found |= record_types(each)
+    return found
 
 
 def meanings(record: Any, *, units: bool = False) -> dict[str, str]:

@@ -8,17 +8,20 @@ Fields with a default came after the first reports of the version.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from validation.columns import column
-from validation.metrics.errors import RunsError
+from validation.kernels.records import Stability
+from validation.metrics.errors import Metrics, RunsError
+from validation.metrics.flip import Flip
 from validation.papers.claims import Judged
-from validation.timing import Timing
+from validation.statistics.records import Agreement, MultipleScattering
+from validation.study.row import Cost
+from validation.timing import FrameTimes, Scaling
 
 SCHEMA = "airlight-report/2"
 
 Number = float | None
-Ends = tuple[Number, Number]  #: of an interval
 Size = tuple[int, int]  #: width and height [pixels]
 Files = Mapping[str, str]  #: names relative to the folder of the report, by what they are
 
@@ -96,123 +99,6 @@ class Reference:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Statistics:
-    """Agreement of two images with standard errors, see `validation.statistics.comparison.Statistics`."""
-
-    masked: int = 0
-    tested: int = 0
-    zero_reference: int = 0
-    zero_reference_error: Number = None
-    zero_variance: int = 0
-    zero_variance_error: Number = None
-    z_mean: Number
-    z_std: Number
-    rejected: int
-    expected_rejections: Number
-    exceeding: int = 0
-    expected_exceeding: Number = None
-    exceeding_p: Number = None
-    blocks: int = 0
-    rejected_blocks: int = 0
-    uniformity_p: Number = None
-    relative_bias: Number
-    relative_bias_ci: Ends
-    relative_bias_ci_batches: Ends | None
-    relative_bias_se: Number = None
-    relative_bias_freedom: Number = None
-    relative_bias_p: Number = None
-    reference_variance_share: Number = None
-    largest_share: Number = None
-    detectable_bias: Number
-    margin: float
-    equivalent: bool | None
-    family_level: Number = None
-    plain_level: Number = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Agreement:
-    """A check of the reference."""
-
-    estimator: Literal["single-scatter", "volpath"] = column(meaning="that checks")
-    layer: Literal["airlight", "surface"] = column(meaning="that is checked")
-    width: int = column(unit="pixels")
-    height: int = column(unit="pixels")
-    batches: int = column(meaning="that were traced")
-    samples: int = column(meaning="per pixel in a batch")
-    epsilon: float = column(meaning="of the shadow rays that it was corrected for")
-    masked: int = column(unit="pixels", meaning="left out")
-    statistics: Statistics = column(meaning="the check confirms the reference if it is `equivalent`")
-    uncorrected_bias: Number = column(meaning="relative bias before the correction")
-    finished: bool = column(meaning="whether its intervals became narrow enough; else it may be undecided")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Share:
-    """A fraction of the light, with its 95 % interval."""
-
-    value: float
-    interval: tuple[float, float]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Multiple:
-    """What scatters more than once."""
-
-    medium: Share
-    everything: Share
-    max_depth: int
-    batches: int
-    samples: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Times:
-    """The times of a frame and of its stages; of an image the frame alone."""
-
-    frame: Timing = column(meaning="a whole frame while nothing moves: median and quartiles")
-    airlight: Timing | None = column(meaning="the airlight alone, with the lists of tiles", default=None)
-    surface: Timing | None = column(meaning="camera rays and the lit surface", default=None)
-    light_moved: Timing | None = column(meaning="a frame after the light moved, shadow maps again", default=None)
-    objects_moved: Timing | None = column(meaning="a frame after objects moved too", default=None)
-    light_moved_camera_cached: Timing | None = column(meaning="the same light, camera rays reused", default=None)
-    colours_changed: Timing | None = column(meaning="a frame after medium or colours alone changed", default=None)
-
-    @property
-    def stages(self) -> dict[str, Timing]:
-        """Those that were measured, by name."""
-        return {name: timing for name, timing in vars(self).items() if timing is not None}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Errors:
-    """Errors of an image, see `validation.metrics.errors`."""
-
-    pixels: int
-    bias: Number
-    relative_bias: Number
-    rmse: Number
-    relative_rmse: Number
-    p50: Number
-    p99: Number
-    max: Number
-    nonfinite: int
-    negative: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Flip:
-    """HDR-FLIP."""
-
-    value: Number
-    note: str
-    start_exposure: Number
-    stop_exposure: Number
-    exposures: int | None
-    pixels_per_degree: Number
-
-
-@dataclass(frozen=True, kw_only=True)
 class MethodRow:
     """What a method costs in a scene and how wrong it is, or the same of an engine's image."""
 
@@ -226,16 +112,16 @@ class MethodRow:
     status: str = column(meaning="`done`, `refused` or `left out`", default="done")
     note: str | None = column(meaning="how its times or its image differ from those of other methods")
     device: str | None = column(meaning="that draws a shader and times it; `null` for Dr.Jit", default=None)
-    times: Times | None = column(meaning="of frames, see below; of an image those of its `times.json`")
+    times: FrameTimes | None = column(meaning="of frames, see below; of an image those of its `times.json`")
     memory: Number = column(unit="MiB", meaning="peak of a frame that prepares everything again", default=None)
-    cost: Mapping[str, float | bool | None] | None = column(
+    cost: Cost | None = column(
         meaning="`cost` of the [rows of a sweep](#rows-of-a-sweep); `null` for images", default=None
     )
-    error: Errors | None = column(meaning="against the reference")
+    error: Metrics | None = column(meaning="against the reference")
     noise: RunsError | None = column(meaning="of a method that draws random numbers: errors over runs", default=None)
-    surface_error: Errors | None = column(meaning="the same for the lit surface; `null` if there is none")
+    surface_error: Metrics | None = column(meaning="the same for the lit surface; `null` if there is none")
     flip: Flip | None = column(meaning="HDR-FLIP of all light, or why there is none; `null` if not asked for")
-    parameters: Mapping[str, float | bool | str] = column(meaning="of the configuration")
+    parameters: Mapping[str, int | float | bool | str] = column(meaning="of the configuration")
     refused: str | None = column(meaning="why there is no frame; `null` if there is one")
     left_out: bool = column(meaning="whether the time was the only reason for `refused`")
     files: Files = column(meaning="`exr`, `picture`, `error` (a picture of the signed relative error)")
@@ -274,88 +160,10 @@ class Scene:
     reference: Reference = column(meaning="the accuracy of the quadrature")
     exposure: float = column(meaning="the factor before the tone curve of all pictures of the scene")
     agreement: Mapping[str, Agreement] = column(meaning="checks of the reference, by name as `volpath airlight`")
-    multiple: Multiple = column(meaning="fraction of the airlight, and of all light, that scatters more than once")
+    multiple: MultipleScattering = column(meaning="fractions of airlight and of all light that scatter more than once")
     files: SceneFiles = column(meaning="of the reference: `exr`, `picture`, `airlight` (a picture of it alone)")
     methods: tuple[Method, ...] = column(meaning="what methods and images cost, and how wrong they are")
     seconds: Mapping[str, float] = column(unit="s", meaning="that its parts took when they were computed")
-
-
-@dataclass(frozen=True, kw_only=True)
-class KernelErrors:
-    """Relative errors of a kernel on a group of rays, see `validation.kernels.errors`."""
-
-    rays: int
-    refused: int
-    median: Number
-    p99: Number
-    max: Number
-    mean: Number
-    nan: int
-    infinite: int
-    negative: int
-    worst: str | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rays:
-    """Errors of a kernel on a set of rays, by group; `all` are all of them."""
-
-    name: str
-    columns: str
-    single: Mapping[str, KernelErrors]
-    double: Mapping[str, KernelErrors]
-    single_against_double: Mapping[str, KernelErrors]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Kernel:
-    """Where a kernel breaks, see `validation.kernels.stability`."""
-
-    kernel: str
-    exact: bool
-    refused: Mapping[str, str]
-    sets: tuple[Rays, ...]
-    gamma: Mapping[str, Any]
-    broken: tuple[str, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cost:
-    """What a frame takes at one step of growing work."""
-
-    work: float
-    frame: Timing
-    light_moved: Timing
-    objects_moved: Timing
-    rays: Timing
-    memory: Number
-
-
-@dataclass(frozen=True, kw_only=True)
-class Growth:
-    """How a time grows, see `validation.study.growth`."""
-
-    exponent: Number
-    standard_error: Number
-    steepest: Number
-    at: Number
-    cliff: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class Scaling:
-    """What a method costs as one kind of work grows."""
-
-    scene: str = column(meaning="of the study")
-    size: Size = column(unit="pixels", meaning="of its images")
-    label: str = column(meaning="the method")
-    kind: Literal["size", "triangles", "lights", "media", "map"] = column(meaning="what grows")
-    costs: tuple[Cost, ...] = column(meaning="by step: the `work`, times of frames and of the camera `rays` alone")
-    growth: Mapping[str, Growth] = column(
-        meaning="of a time by name: `exponent` of the fit time ~ work^exponent, its `standard_error`, the `steepest` "
-        "between two steps, the work `at` the second, and whether that is a `cliff`"
-    )
-    refused: str | None = column(meaning="why the steps end early; `null` if all were made")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -374,6 +182,6 @@ class Report:
     environment: Environment = column(meaning="what made the numbers: versions, processor, variant, LLVM or device")
     claims: tuple[Claim, ...] = column(meaning="the sentences of the page")
     scenes: tuple[Scene, ...] = column(meaning="what was measured, by scene")
-    stability: tuple[Kernel, ...] = column(meaning="by kernel, where it breaks; empty with `--quick`")
+    stability: tuple[Stability, ...] = column(meaning="by kernel, where it breaks; empty with `--quick`")
     scaling: tuple[Scaling, ...] = column(meaning="how times grow with the work; empty without `--full`", default=())
     papers: tuple[Judged, ...] = column(meaning="claims of papers, as `airlight paper` prints them", default=())

@@ -11,12 +11,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from analytic.errors import InputError
-from reports.data.records import Errors, MethodRow, Report, Scene
+from reports.data.records import MethodRow, Report, Scene
 from reports.diff.times import Finding, TimeComparison, compare_times
 from reports.report.claims import confirmed
 from reports.tables.agreement import verdict
 from reports.tables.scaling import TIMES, WORK, same_records
 from reports.tables.table import Column, Table, table, words
+from validation.metrics.errors import Metrics
 from validation.papers.claims import Judged
 from validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
 
@@ -146,10 +147,10 @@ def _incomparable(old: Scene, new: Scene) -> Finding | None:
 Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
 
 
-Numbers = Mapping[str, Any]  #: of `Errors` by name, and `NAME_within`, half of the interval of a number
+Numbers = Mapping[str, Any]  #: of `Metrics` by name, and `NAME_within`, half of the interval of a number
 
 
-def _numbers(errors: Errors | None) -> Numbers:
+def _numbers(errors: Metrics | None) -> Numbers:
     return asdict(errors) if errors else {}
 
 

@@ -93,7 +93,7 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
 def _timed(report: Report) -> dict[Key, tuple[Size, str | None, Times]]:
     """Return the size of the frames that were timed, the device or the note on how, and times, by scene and label."""
     return {
-        (scene.name, entry.label): (scene.timed, entry.device or entry.note, entry.times.stages)
+        (scene.name, entry.label): (scene.timed, entry.device or entry.note, entry.times.measured)
         for scene in report.scenes
         for entry in scene.methods
         if entry.times

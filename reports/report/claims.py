@@ -16,10 +16,12 @@ The kinds of claims:
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from realtime.methods.shader.source import is_users
-from reports.data.records import Agreement, Claim, MethodRow, Scaling, Scene
-from reports.tables.agreement import verdict, worst_interval
+from reports.data.records import Claim, MethodRow, Scene
+from reports.tables.agreement import margin_words, verdict, worst_interval
 from reports.tables.methods import published_as
 from reports.tables.scaling import WORK, cliffs
+from validation.statistics.records import Agreement
+from validation.timing import Scaling
 
 Scenes = Sequence[Scene]
 Entries = Sequence[tuple[str, MethodRow]]  #: with the names of their scenes
@@ -94,32 +96,35 @@ def _trust(scenes: Scenes) -> list[Claim]:
 
 
 def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
-    against = [f"{name} ({entry.layer})" for name, entry in compared if verdict(entry) is False]
-    # Under area lights the reference has errors of its own, and the margin is wider.
-    margin = " or ".join(f"±{100 * each:g} %" for each in sorted({entry.statistics.margin for _, entry in compared}))
+    against, open_ = ([_place(*pair) for pair in compared if verdict(pair[1]) is found] for found in (False, None))
     if against:
         text = (
-            f"The reference is NOT confirmed within {margin} by {words} in {', '.join(against)}: there the 95 % "
-            "interval of the relative bias is not inside the margin."
+            f"The reference is NOT confirmed by {words} in {', '.join(against)}: there the 95 % interval of the "
+            "relative bias is not inside the margin."
         )
         return _claim("reference", text, False)
-    open_ = [f"{name} ({entry.layer})" for name, entry in compared if verdict(entry) is None]
     good = [pair for pair in compared if verdict(pair[1])]
     text = ""
     if good:
-        name, worst = max(good, key=lambda pair: worst_interval([pair[1]])[1])
+        filled = {_place(*pair): worst_interval([pair[1]]) for pair in good}
+        place, (worst, most) = max(filled.items(), key=lambda item: item[1][1])
         low, high = (100 * (end or 0.0) for end in worst.statistics.relative_bias_ci)
+        # Under area lights the reference has errors of its own, and the margin is wider.
         text = (
             f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
-            f"of the pooled relative bias lies within its margin of {margin}; the worst is {low:+.2g}..{high:+.2g} %, "
-            f"in {name} ({worst.layer})."
+            f"of the pooled relative bias lies within its margin. The interval that fills most of its margin, "
+            f"{100 * most:.0f} %, is {low:+.2g}..{high:+.2g} %, in {place}."
         )
     if open_:
         text += (" " if text else "") + (
             f"By {words} it is not decided within the time in {', '.join(open_)}: the 95 % interval is not narrow "
-            f"enough there for its margin of {margin}."
+            "enough there."
         )
     return _claim("reference", text, None if open_ else True)
+
+
+def _place(scene: str, entry: Agreement) -> str:
+    return f"{scene} ({entry.layer}, {margin_words(entry.statistics)})"
 
 
 def _left_out(scenes: Scenes) -> Claim:

@@ -14,15 +14,15 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.methods.shader.source import is_shader
 from reference.storage.files import NO_SPACE, ensure_folder
 from reference.storage.kept import fresh_results
-from reports.data.reader import record_of, report_text
-from reports.data.records import SCHEMA, Environment, Kernel, Measured, Report, Scaling, Settings
+from reports.data.reader import report_text
+from reports.data.records import SCHEMA, Environment, Measured, Report, Settings
 from reports.machine.environment import describe_environment, machine, threads
 from reports.machine.opengl import require_opengl
 from reports.machine.own_process import EndedError, in_own_process
@@ -31,6 +31,8 @@ from reports.page.render import render_page
 from reports.report.claims import claims, growth_claims, own_fault, unstudied
 from reports.report.others import other_parts, paper_rows, shares
 from reports.report.scene import folder_of, write_scene
+from validation.columns import record_of
+from validation.kernels.records import Stability
 from validation.scenes.loading import scene_stem
 from validation.scenes.random.design import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
@@ -39,12 +41,14 @@ from validation.study.results import Result, date
 from validation.study.run import PROBE, Apart, frame_of
 from validation.study.scene import SceneStudy, open_scene, study_scene
 from validation.study.study import STUDIES, Cell, Study, standard_study
+from validation.timing import Scaling
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Client
     from reports.cluster.references import Picture
     from validation.engine.images import EngineImage
     from validation.estimates.monte_carlo import ElsewhereFor
+    from validation.study.scene import Judged
 
 _PAGE_SECONDS = 1.0  # to pack the images of a scene and draw its part of the page
 
@@ -138,7 +142,7 @@ def write_report(
             environment=record_of(environment, Environment),
             claims=(*claims(studied), *growth_claims(scaling), *(unstudied(names, list(FOG_SCENES)) if usual else [])),
             scenes=tuple(studied),
-            stability=tuple(record_of(each, Kernel) for each in kernels),
+            stability=tuple(record_of(each, Stability) for each in kernels),
             scaling=tuple(scaling),
             papers=tuple(paper_rows(by_kind.get("papers", ()))),
         )
@@ -216,10 +220,10 @@ def _try_own(study: SceneStudy, apart: Apart | None) -> dict[Configuration, str]
     return ended
 
 
-def _raise_own_faults(rows: Sequence[Any], apart: Apart | None) -> None:
+def _raise_own_faults(rows: "Sequence[Judged]", apart: Apart | None) -> None:
     """Raise the first fault of a user's method that runs in this process."""
     for judged in rows if apart is None else ():
-        fault = own_fault(judged.row["method"], judged.row["reason"])
+        fault = own_fault(judged.row.method, judged.row.reason)
         if fault:
             raise InputError(fault)
 

@@ -12,7 +12,7 @@ from reference.storage.kept import is_kept, key_of
 from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
-from validation.metrics.errors import plain
+from validation.kernels.records import Stability
 from validation.papers.claims import EFFORTS, Claim, Judged, claims, experiments, judged
 from validation.study.results import Computed, Result, cached_result
 from validation.study.study import Study, standard_study
@@ -72,16 +72,17 @@ def _stability(rays: int, progress: Progress) -> Computed:
     from realtime.kernels.registry import KERNELS
     from validation.kernels.stability import stability
 
-    known = in_own_process(known_kernels, rays, what="study", name="of the kernels", limit=math.inf, quick=True)
-    added = [name for name in KERNELS if name not in {kernel["kernel"] for kernel in known}]
-    return {"kernels": known + (plain(stability(added, count=rays, progress=counted(progress))) if added else [])}, {}
+    how: dict[str, Any] = {"what": "study", "name": "of the kernels", "limit": math.inf, "quick": True}
+    known: list[Stability] = in_own_process(known_kernels, rays, **how)
+    added = [name for name in KERNELS if name not in {kernel.kernel for kernel in known}]
+    return {"kernels": known + (stability(added, count=rays, progress=counted(progress)) if added else [])}, {}
 
 
-def known_kernels(rays: int) -> list[dict[str, Any]]:
+def known_kernels(rays: int) -> list[Stability]:
     """Return how stable the kernels of airlight are, in a process that knows no others."""
     from validation.kernels.stability import stability
 
-    return plain(stability(count=rays))
+    return stability(count=rays)
 
 
 # --- growth ----------------------------------------------------------------------------------------------------------

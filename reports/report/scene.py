@@ -4,6 +4,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,13 @@ import numpy as np
 from realtime.scene.read_scene import describe
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import Image, write_exr
-from reports.data.reader import record_of
-from reports.data.records import Method, MethodRow, Reference, Scene
+from reports.data.records import Method, MethodRow, Reference, Scene, SceneFiles
 from reports.machine.environment import stamped
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
+from validation.columns import record_of
 from validation.estimates.images import layered_reference
-from validation.metrics.errors import plain
 from validation.scenes.loading import scene_stem
+from validation.study.row import Row
 from validation.study.scene import Judged, SceneResult
 
 #: Files of a report by what they are.
@@ -34,32 +35,31 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
     factor = exposure(light)
     pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(reference.airlight, factor)}
     named = files.written(_REFERENCE, layered_reference(study.name, reference), pictures)
-    stems = file_stems([judged.row["label"] for judged in result.rows])
-    made = {
-        "name": study.name,
-        "purpose": study.loaded.purpose,
-        "published": study.loaded.published,
-        "path": str(study.loaded.path) if study.loaded.path else None,
-        "size": study.size,
-        "timed": study.study.measure.timed_size or study.size,
-        "plan": describe(study.scene.features),
-        "notes": study.scene.features.notes,
-        "reference": reference_record(reference),
-        "exposure": factor,
-        "agreement": result.agreement,
-        "multiple": result.multiple,
-        "files": named,
-        "methods": [_entry(judged, files, stem, factor) for judged, stem in zip(result.rows, stems, strict=True)],
-        "seconds": result.seconds,
-    }
-    return record_of(made, Scene)
+    stems = file_stems([judged.row.label for judged in result.rows])
+    return Scene(
+        name=study.name,
+        purpose=study.loaded.purpose,
+        published=study.loaded.published,
+        path=str(study.loaded.path) if study.loaded.path else None,
+        size=study.size,
+        timed=study.study.measure.timed_size or study.size,
+        plan=describe(study.scene.features),
+        notes=tuple(study.scene.features.notes),
+        reference=reference_record(reference),
+        exposure=factor,
+        agreement=result.agreement,
+        multiple=result.multiple,
+        files=SceneFiles(**named),
+        methods=tuple(_entry(judged, files, stem, factor) for judged, stem in zip(result.rows, stems, strict=True)),
+        seconds=result.seconds,
+    )
 
 
 def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> Method:
     """Return the record of a row, with its files written."""
     row, named = judged.row, dict[str, str]()
     if judged.image is not None and judged.expected is not None:
-        test = np.asarray(judged.image.layers[row["layer"]], dtype=np.float64)
+        test = np.asarray(judged.image.layers[row.layer], dtype=np.float64)
         pictures = {"picture": tone_mapped(judged.light, factor), "error": error_map(judged.expected, test)}
         named = files.written(stem, judged.image, pictures)
     return Method(
@@ -70,10 +70,11 @@ def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> Method:
     )
 
 
-def row_record(row: Mapping[str, Any], files: Mapping[str, str]) -> MethodRow:
-    """Return the record of a `Row`, as JSON has it, with the names of its files."""
-    more = {"refused": row["reason"], "left_out": row["status"] == "left out", "files": files}
-    return record_of({**row, "parameters": json.loads(row["parameters"]), **more}, MethodRow)
+def row_record(row: Row, files: Mapping[str, str]) -> MethodRow:
+    """Return what a report says of a row, with the names of its files."""
+    own = {name: getattr(row, name) for name in (each.name for each in fields(MethodRow)) if hasattr(row, name)}
+    own |= {"parameters": json.loads(row.parameters), "refused": row.reason, "left_out": row.status == "left out"}
+    return MethodRow(**own, files=files)
 
 
 def reference_record(reference: ReferenceImage) -> Reference:
@@ -82,7 +83,7 @@ def reference_record(reference: ReferenceImage) -> Reference:
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
     bound = float(reference.airlight_bound[finite].mean()) / mean if mean > 0 else None
-    found = plain({"mean": mean, "relative_bound": bound} | {name: getattr(reference, name) for name in numbers})
+    found = {"mean": mean, "relative_bound": bound} | {name: getattr(reference, name) for name in numbers}
     return record_of(found, Reference)
 
 

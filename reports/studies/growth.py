@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -26,6 +26,7 @@ from reports.machine.progress import counted, part_of
 from reports.studies.methods import cells_of, check_study, loaded_scenes, scene_by_scene
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import numbers, table
+from validation.timing import Scaling, StepCost
 
 
 @one_error
@@ -59,8 +60,6 @@ def scaling(
 
     activate()
     from reports.api.render import asked_configurations
-    from reports.data.reader import record_of
-    from reports.data.records import Scaling
     from reports.tables.scaling import cliffs, scaling_tables
     from validation.study.growth import study_growth
     from validation.study.ladders import ladder
@@ -76,22 +75,22 @@ def scaling(
     names = [str(name) for name in several(scenes)] or usual.scenes
     # Scenes that have nothing of a kind are refused before an hour of work, not after.
     ladders = [(name, kind, ladder(kind, name, study.sizes[0])) for name in names for kind in wanted]
-    records: list[Any] = []
+    records: list[Scaling] = []
     with telling(progress, "scaling") as tell:
         for at, (name, kind, steps) in enumerate(ladders):
             part = part_of(tell, at / len(ladders), (at + 1) / len(ladders))
             found = study_growth(replace(study, scenes=(name,)), kind, steps, progress=counted(part))
-            records += [record_of(each, Scaling) for each in found]
+            records += found
     return Study(
         name="scaling",
-        data=with_environment(scaling=[asdict(each) for each in records]),
+        data=with_environment(scaling=records),
         drawn=tuple(scaling_tables(records)),
         wrong=tuple(cliffs(records)),
         draw=partial(_draw_scaling, records),
     )
 
 
-def _draw_scaling(records: list[Any], column: str) -> Any:
+def _draw_scaling(records: list[Scaling], column: str) -> Any:
     """Return the time of a frame over its work, by kind of work, with the fitted exponents and the camera rays."""
     from reports.plotting.figure import new_figure
     from reports.plotting.style import WIDTHS, method_style
@@ -104,7 +103,7 @@ def _draw_scaling(records: list[Any], column: str) -> Any:
     figure = new_figure(width, (0.42 if double else 0.9) * width * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for panel, kind in zip(panels, kinds):
-        costs: list[Any] = []
+        costs: tuple[StepCost, ...] = ()
         for record in (each for each in records if each.kind == kind):
             costs = record.costs
             label = f"{record.label}: power {record.growth['frame'].exponent or math.nan:.2f}"
@@ -162,7 +161,7 @@ def map_size(
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import check_size
     from reports.api.render import checked_configuration
-    from validation.metrics.errors import plain
+    from validation.columns import plain
     from validation.study.configuration import parse_settings, prepared
     from validation.study.growth import fitted_exponent
     from validation.study.study import standard_study

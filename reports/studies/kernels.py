@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from analytic.errors import InputError
 from reports.api.inputs import File, KernelLike, Kernels, Progress, kernel_name, one_error, several, telling
-from reports.data.reader import record_of
-from reports.data.records import Kernel
 from reports.machine.progress import counted
 from reports.studies.result import Study, with_environment
 from reports.tables.kernels import kernel_tables, stability_summary
@@ -22,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from validation.kernels.case_files import Cases
+    from validation.kernels.records import KernelCost, Stability
 
     CasesLike: TypeAlias = Mapping[str, Any] | Cases | File
 else:
@@ -54,26 +53,22 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
 
     activate()
     from validation.kernels.benchmark import PHASES, bench_kernels, speed_against_error
-    from validation.metrics.errors import plain
 
     phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "kernels") as tell:
         found = bench_kernels(named, phases=phases, progress=counted(tell))
-    data = {"costs": plain(found), "levels": plain(speed_against_error(found))}
-    drawn = kernel_tables(data["costs"], data["levels"])
-    said = ("ns/ray: the kernel alone by Dr.Jit's history, median.",)
-    shown = [cost for cost in data["costs"] if cost["phase"] == phases[0][0] and not cost["refused"]]
+    levels = speed_against_error(found)
     return Study(
         name="kernels",
-        data=with_environment(kernels=data),
-        drawn=tuple(drawn),
-        said=said,
-        draw=partial(_draw_costs, shown),
+        data=with_environment(kernels={"costs": found, "levels": levels}),
+        drawn=tuple(kernel_tables(found, levels)),
+        said=("ns/ray: the kernel alone by Dr.Jit's history, median.",),
+        draw=partial(_draw_costs, [cost for cost in found if cost.phase == phases[0][0] and cost.time]),
     )
 
 
-def _draw_costs(costs: Sequence[Mapping[str, Any]], column: str) -> Any:
+def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
     """Return nanoseconds a ray against the error."""
     from reports.plotting.figure import new_figure
     from reports.plotting.style import WIDTHS, kernel_style
@@ -82,12 +77,12 @@ def _draw_costs(costs: Sequence[Mapping[str, Any]], column: str) -> Any:
     figure = new_figure(width, 0.42 * width if double else 1.9 * width)
     panels = figure.subplots(*((1, 3) if double else (3, 1)), sharex=True, sharey=True)
     for panel, (statistic, title) in zip(panels, _STATISTICS.items()):
-        for family in dict.fromkeys(cost["family"] for cost in costs):
+        for family in dict.fromkeys(cost.family for cost in costs):
             style = kernel_style(family)
             points = sorted(
-                ((cost["device"] or cost["wall"])["median"], cost[statistic])
+                (cost.time.median, error)
                 for cost in costs
-                if cost["family"] == family and (cost["device"] or cost["wall"]) and cost[statistic] is not None
+                if cost.family == family and cost.time and (error := getattr(cost, statistic)) is not None
             )
             times = [point[0] for point in points]
             errors = [min(max(point[1], _SHOWN[0]), _SHOWN[1]) for point in points]
@@ -126,30 +121,28 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     activate()
     from validation.kernels.stability import BAR, CERTIFIED
     from validation.kernels.stability import stability as run
-    from validation.metrics.errors import plain
 
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "stability") as tell:
         found = run(named, count=_TRIED_RAYS, progress=counted(tell))
-    data = plain({"certified": CERTIFIED, "bar": BAR, "kernels": found})
     return Study(
         name="stability",
-        data=with_environment(**data),
-        drawn=(stability_summary(record_of(one, Kernel) for one in data["kernels"]),),
-        said=tuple(line for one in data["kernels"] for line in _stability_lines(one)),
-        good=not any(one["broken"] for one in data["kernels"]),
+        data=with_environment(certified=CERTIFIED, bar=BAR, kernels=found),
+        drawn=(stability_summary(found),),
+        said=tuple(line for one in found for line in _stability_lines(one)),
+        good=not any(one.broken for one in found),
     )
 
 
-def _stability_lines(kernel: Mapping[str, Any]) -> Iterator[str]:
-    for phase, reason in kernel["refused"].items():
-        yield f"{kernel['kernel']} refuses {phase}: {reason}"
-    for rays in kernel["sets"]:
-        worst = [rays[precision]["all"]["worst"] for precision in ("single", "double")]
+def _stability_lines(found: "Stability") -> Iterator[str]:
+    for phase, reason in found.refused.items():
+        yield f"{found.kernel} refuses {phase}: {reason}"
+    for rays in found.sets:
+        worst = [errors["all"].worst for errors in (rays.single, rays.double)]
         if any(worst):
-            yield f"worst rays of {kernel['kernel']}, float32 then float64:"
-            yield from (rays["columns"], *filter(None, worst))
-    yield from (f"BROKEN: {kernel['kernel']}, {reason}" for reason in kernel["broken"])
+            yield f"worst rays of {found.kernel}, float32 then float64:"
+            yield from (rays.columns, *filter(None, worst))
+    yield from (f"BROKEN: {found.kernel}, {reason}" for reason in found.broken)
 
 
 # Integrals of a file

@@ -161,7 +161,6 @@ def methods(
     from reports.report.claims import own_faults
     from reports.report.scene import row_record
     from reports.tables.methods import methods_table
-    from validation.metrics.errors import plain
     from validation.study.scene import configurations_for
     from validation.study.study import Measure
 
@@ -175,7 +174,7 @@ def methods(
         for at, each in enumerate(useful):
             tell(at / len(useful), each.label)
             row = cell(each)[0]
-            records.append(row_record(plain(row), {}))
+            records.append(row_record(row, {}))
             rows.append({**_flat(row, each), "scene": scene.name})
         benched.append({"name": scene.name, "size": [*scene.size], "methods": [asdict(each) for each in records]})
         tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), records))
@@ -191,8 +190,7 @@ def methods(
 
 def _flat(row: Any, chosen: Any) -> dict[str, Any]:
     """Return the numbers of a row, see `MethodsStudy`."""
-    from validation.metrics.errors import plain
-    from validation.study.frame_times import FrameTimes
+    from validation.timing import FrameTimes
 
     times, error = row.times, row.error
     flat: dict[str, Any] = {name: getattr(row, name) for name in ("scene", "width", "height", "label", "method")}
@@ -201,7 +199,7 @@ def _flat(row: Any, chosen: Any) -> dict[str, Any]:
     medians = times.medians if times else {}
     flat |= {f"{each.name}_ms": medians.get(each.name) for each in fields(FrameTimes)}
     for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative"):
-        flat[name] = error and plain(getattr(error, name))
+        flat[name] = error and getattr(error, name)
     return flat | {"refused": row.reason, "note": row.note}
 
 
@@ -277,7 +275,7 @@ def _split(
     loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progress: Any
 ) -> tuple[list[dict[str, Any]], Any]:
     """Return the errors of a scene by cause, JSON-ready and with their images."""
-    from validation.metrics.errors import plain
+    from validation.columns import plain
     from validation.study.causes import decompose
     from validation.study.scene import configurations_for
 

@@ -52,7 +52,7 @@ def noise(
     activate()
     from reports.api.render import asked_configurations
     from reports.api.scenes import opened
-    from validation.metrics.errors import plain
+    from validation.columns import plain
     from validation.motion.noise import BLURS, time_words
     from validation.study.configuration import named_configurations
     from validation.study.noise import method_noise

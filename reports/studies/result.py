@@ -123,5 +123,6 @@ def _rows_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 def with_environment(**data: Any) -> dict[str, Any]:
     """Return data with the machine and the versions that made them."""
     from reports.machine.environment import describe_environment
+    from validation.columns import plain
 
-    return {"environment": describe_environment(), **data}
+    return {"environment": describe_environment(), **plain(data)}

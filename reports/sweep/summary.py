@@ -14,7 +14,7 @@ from reports.sweep.correlations import Correlation, correlations, property_words
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
 from reports.sweep.read import Numbers, Sweep
 from reports.sweep.samples import FAULTS, Fastest, Sample, drawn_at_random, fastest_within, samples
-from validation.metrics.errors import plain
+from validation.columns import plain
 from validation.statistics.samples import LEVEL, binomial_interval, quantile_interval
 
 SCHEMA = "airlight-sweep/1"

@@ -3,8 +3,9 @@
 
 from collections.abc import Iterable, Sequence
 
-from reports.data.records import Agreement, Scene
+from reports.data.records import Scene
 from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, numbers, table, words
+from validation.statistics.records import Agreement, Statistics
 
 _PERCENT = {"percent": True, "sign": True}
 #: Columns of what estimators say of the reference, with their meaning.
@@ -46,29 +47,34 @@ def verdict(compared: Agreement) -> bool | None:
     if statistics.equivalent:
         return True
     low, high = statistics.relative_bias_ci
-    if compared.finished or low is None or high is None:
+    if compared.finished or low is None or high is None or statistics.margin is None:
         return False
     return None if low <= statistics.margin and high >= -statistics.margin else False
 
 
 def worst_interval(compared: Iterable[Agreement]) -> tuple[Agreement, float]:
-    """Return the comparison whose 95 % interval of the relative bias reaches the furthest from 0, and how far.
+    """Return the comparison whose 95 % interval of the relative bias fills most of its own margin, and the fraction.
 
-    One whose interval is not known reaches furthest of all.
+    One whose interval is not known fills more than any other.
     """
 
     def reach(comparison: Agreement) -> float:
-        low, high = comparison.statistics.relative_bias_ci
-        return float("inf") if low is None or high is None else max(abs(low), abs(high))
+        (low, high), margin = comparison.statistics.relative_bias_ci, comparison.statistics.margin
+        return float("inf") if low is None or high is None or not margin else max(abs(low), abs(high)) / margin
 
     worst = max(compared, key=reach)
     return worst, reach(worst)
 
 
+def margin_words(statistics: Statistics) -> str:
+    """Return the margin of a comparison in words."""
+    return f"±{100 * (statistics.margin or 0.0):g} %"
+
+
 def trust_table(scenes: Sequence[Scene]) -> Table:
     """Return how far the reference of each scene can be trusted: its own bound, its checks, the estimators' intervals.
 
-    An estimator has the worst of its intervals over the layers of a scene.
+    An estimator has the interval that fills most of its margin, over the layers of a scene.
     """
     estimators = list(dict.fromkeys(entry.estimator for scene in scenes for entry in scene.agreement.values()))
     columns = (
@@ -86,8 +92,8 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
         explanation=(
             "The reference is a quadrature in double precision, with a bound of its error as a fraction of the mean "
             "airlight. Two Monte Carlo estimators, which share no derivation with it, check it: the 95 % interval of "
-            "their relative bias must lie inside a margin. Of several layers the worst interval is shown; each scene "
-            "below has them all."
+            "their relative bias must lie inside a margin. Of several layers the interval that fills most of its "
+            "margin is shown; each scene below has them all."
         ),
     ).only(*order)
 
@@ -103,7 +109,7 @@ def _trust(scene: Scene, estimators: Iterable[str]) -> Row:
         good = False if False in verdicts else None if None in verdicts else True
         worst = worst_interval(compared)[0].statistics
         values[name] = Interval.of(worst.relative_bias_ci)
-        values[f"{name} agrees"] = Verdict(good, f"±{100 * worst.margin:g} %")
+        values[f"{name} agrees"] = Verdict(good, margin_words(worst))
     return Row(values)
 
 

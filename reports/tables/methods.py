@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from realtime.methods.shader.source import is_shader
 from reports.data.reader import meanings
-from reports.data.records import MethodRow, Scene, Times
+from reports.data.records import MethodRow, Scene
 from reports.tables.table import (
     Column,
     Name,
@@ -22,14 +22,14 @@ from reports.tables.table import (
 )
 from validation.columns import columns_of
 from validation.metrics.errors import Metrics
-from validation.timing import Timing
+from validation.timing import FrameTimes, Timing
 
 #: What is timed of a frame, by its name in report.json.
-TIMES = tuple(meanings(Times))
+TIMES = tuple(meanings(FrameTimes))
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 
 _OF_ROWS = meanings(MethodRow)
-_MEANINGS = {column.key: column.meaning for column in columns_of(Metrics)} | meanings(Times)
+_MEANINGS = {column.key: column.meaning for column in columns_of(Metrics)} | meanings(FrameTimes)
 _MEANINGS |= {key: _OF_ROWS[key] for key in ("device", "memory", "flip")}
 _MEANINGS["nonfinite"] = "pixels that are no number, which errors leave out"
 

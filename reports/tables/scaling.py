@@ -4,8 +4,8 @@
 from collections.abc import Iterable
 from typing import Any
 
-from reports.data.records import Scaling
 from reports.tables.table import Column, Row, Table, Value, measured, numbers, table, words
+from validation.timing import Scaling
 
 WORK = {
     "size": "pixels",

@@ -63,11 +63,11 @@ class KnownReference:
 class ViewError:
     """The error of the airlight of a frame against what is known of its reference, over the mean of that."""
 
-    relative_rmse: float
-    interval: float  #: half of the 95 % interval of that, for the pixels that are not known yet
-    relative_bias: float
-    p99: float  #: see `validation.metrics.errors`
-    bound: float  #: root mean square of the reference's own bound: the most by which it changes the error
+    relative_rmse: float | None
+    interval: float | None  #: half of the 95 % interval of that, for the pixels that are not known yet
+    relative_bias: float | None
+    p99: float | None  #: see `validation.metrics.errors`
+    bound: float | None  #: root mean square of the reference's own bound: the most by which it changes the error
     known: int  #: pixels
     pixels: int
 
@@ -88,10 +88,10 @@ def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
     bound = float(np.sqrt(np.mean(found.bound[known] ** 2)))
     return ViewError(
         metrics.relative_rmse,
-        interval / mean if mean > 0 else np.nan,
+        interval / mean if mean > 0 else None,
         metrics.relative_bias,
         metrics.p99,
-        bound / mean if mean > 0 else np.nan,
+        bound / mean if mean > 0 else None,
         count,
         pixels,
     )

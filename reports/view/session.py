@@ -38,7 +38,7 @@ from reports.view.widgets import (
     parameter_widgets,
     scene_widgets,
 )
-from validation.metrics.errors import plain
+from validation.columns import plain
 from validation.scenes.changes import Values
 from validation.study.configuration import Configuration, configuration
 

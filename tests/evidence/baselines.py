@@ -24,8 +24,8 @@ import numpy as np
 from realtime.kernels.registry import KERNELS
 from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
+from validation.columns import plain
 from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import plain
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import SCENES
 from validation.statistics.noise import ERROR_TOLERANCE, error_band

@@ -14,11 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.errors import InputError
 from reference.storage.exr import NOTE, TOTAL, Image, layer_names, read_exr
 from reference.storage.exr import layer as image_layer
+from validation.columns import plain
 from validation.metrics.colour import ColourDifference, colour_difference
-from validation.metrics.errors import Metrics, compared, error_metrics, plain, wrong_pixels
+from validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
 from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
-from validation.statistics.comparison import Estimate, Statistics, compare_statistics
+from validation.statistics.comparison import Estimate, compare_statistics
+from validation.statistics.records import Statistics
 
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
@@ -73,7 +75,7 @@ class Comparison:
             f"rmse             {shown(m.rmse)} W/(m^2 sr), relative {percent(m.relative_rmse)}",
             f"relative error   p50 {shown(m.p50, 3)}, p99 {shown(m.p99, 3)}, max {shown(m.max, 3)}",
         ]
-        if math.isfinite(m.bias) and not math.isfinite(m.relative_bias):
+        if m.bias is not None and m.relative_bias is None:
             lines.append("  undefined      the mean of the reference is not above zero: nothing is relative to it")
         if self.statistics is not None:
             lines += statistics_lines(self.statistics)
@@ -253,17 +255,17 @@ def flip_line(f: Flip) -> str:
     )
 
 
-def percent(value: float) -> str:
-    """Return a share, `value` [1], as text in percent: '0.12 %' for 0.0012."""
-    return f"{shown(100 * value)} %" if math.isfinite(value) else shown(value)
+def percent(value: float | None) -> str:
+    """Return a fraction, `value` [1], as text in percent: '0.12 %' for 0.0012."""
+    return shown(value) if value is None or not math.isfinite(value) else f"{shown(100 * value)} %"
 
 
-def shown(value: float, digits: int = 4) -> str:
+def shown(value: float | None, digits: int = 4) -> str:
     """Return a number, or a word for what is none."""
-    if math.isnan(value):
+    if value is None or math.isnan(value):
         return "undefined"
     return "unlimited" if math.isinf(value) else f"{value:.{digits}g}"
 
 
-def _fixed(value: float) -> str:
-    return f"{value:.3f}" if math.isfinite(value) else shown(value)
+def _fixed(value: float | None) -> str:
+    return shown(value) if value is None else f"{value:.3f}"

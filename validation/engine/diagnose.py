@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
+from validation.columns import plain
 from validation.engine.error_place import place_words
 from validation.engine.evidence import (
     LEAST_EFFECT,
@@ -35,7 +36,6 @@ from validation.engine.judged_layer import JudgedLayer, judged_layer
 from validation.engine.prediction import Predictor, SceneLight
 from validation.engine.search import Explanation, begin, explain
 from validation.engine.seen import Progress, best_kind, layers_of, pixel_kinds, scene_of_size, seen_image
-from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ from scipy.ndimage import binary_dilation, laplace, maximum_filter, minimum_filt
 
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import ReferenceScene
+from validation.columns import plain
 from validation.engine.prediction import Predictor
 from validation.engine.search import Explanation
-from validation.metrics.errors import plain
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -36,6 +36,7 @@ from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import read_reference
 from reference.storage.exr import NOTE, TOTAL, Image, read_exr
+from validation.columns import plain
 from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
 from validation.engine.error_place import ErrorPlace, error_place
 from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
@@ -43,7 +44,7 @@ from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, j
 from validation.engine.seen import Progress, pixel_kinds, scene_of_size
 from validation.estimates.agreement import pixel_angle
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer
-from validation.metrics.errors import FLOOR, plain
+from validation.metrics.errors import FLOOR
 from validation.scenes.loading import LoadedScene
 from validation.statistics.comparison import block_sums
 
@@ -147,8 +148,13 @@ class EngineComparison:
         """Why the comparison must be called failed; empty if it is not."""
         bias = self.comparison.metrics.relative_bias
         reasons = self.comparison.failures
-        if self.margin is not None and self.comparison.statistics is None and not abs(bias) <= self.margin:
-            reasons = (*reasons, f"the relative bias, {bias:+.3g}, is not within +-{self.margin:.3g}")
+        if (
+            self.margin is not None
+            and self.comparison.statistics is None
+            and not (bias is not None and abs(bias) <= self.margin)
+        ):
+            told = "undefined" if bias is None else f"{bias:+.3g}"
+            reasons = (*reasons, f"the relative bias, {told}, is not within +-{self.margin:.3g}")
         return reasons
 
     def to_json(self) -> dict[str, Any]:

@@ -18,10 +18,10 @@ bounded only by 1/h^2, so that no number of samples gives a standard error to tr
 extent leave out none: their fluence is bounded.
 """
 
+import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,8 @@ from reference.scene.read import ReferenceScene, read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer
-from validation.statistics.comparison import Estimate, Statistics, compare_statistics
+from validation.statistics.comparison import Estimate, compare_statistics
+from validation.statistics.records import Agreement, Statistics
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -47,23 +48,6 @@ WIDE_MARGIN = 0.0025
 _LEAST_BATCHES = {"volpath": 32, "single-scatter": 96}
 _SAMPLES = 64  # a pixel in each batch
 _PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """How far an estimator is from the quadrature image in one layer."""
-
-    estimator: str  #: 'volpath' or 'single-scatter'
-    layer: str  #: 'airlight' or 'surface'
-    width: int  #: of the image [pixels]
-    height: int  #: of the image [pixels]
-    batches: int  #: traced or taken from the cache
-    samples: int  #: a pixel and batch
-    epsilon: float  #: the shadow-ray epsilon that was corrected for; 0 for single-scatter, which has none
-    masked: int  #: pixels left out because a light is close to their ray
-    statistics: Statistics  #: of the estimator against the quadrature, for volpath that of the shortened shadow ray
-    uncorrected_bias: float  #: pooled relative bias against the plain reference
-    finished: bool = True  #: whether the intervals became as narrow as wanted; else time or batches ran out before
 
 
 def agreement(
@@ -124,17 +108,17 @@ def agreement(
     results = {layer: compared(traced, layer) for layer in layers}
     return {
         layer: Agreement(
-            estimator,
-            layer,
-            plain.distance.shape[1],
-            plain.distance.shape[0],
-            len(traced.seeds),
-            traced.samples,
-            epsilon,
-            int((~masks[layer]).sum()),
-            results[layer],
-            _bias(getattr(plain, layer), traced, layer, masks[layer]),
-            width_to_reach(results[layer], margin) < 1,
+            estimator=cast("Any", estimator),
+            layer=cast("Any", layer),
+            width=plain.distance.shape[1],
+            height=plain.distance.shape[0],
+            batches=len(traced.seeds),
+            samples=traced.samples,
+            epsilon=epsilon,
+            masked=int((~masks[layer]).sum()),
+            statistics=results[layer],
+            uncorrected_bias=_bias(getattr(plain, layer), traced, layer, masks[layer]),
+            finished=width_to_reach(results[layer], margin) < 1,
         )
         for layer in layers
     }
@@ -210,16 +194,17 @@ def batch_estimate(batches: Batches, layer: str, mask: Mask) -> Estimate:
     )
 
 
-def widest_interval(statistics: Statistics) -> tuple[float, float]:
-    """Return the ends of the wider of the 95 % intervals of the relative bias [1]."""
-    intervals = [statistics.relative_bias_ci, statistics.relative_bias_ci_batches]
-    return max((pair for pair in intervals if pair is not None), key=lambda pair: pair[1] - pair[0])
+def widest_interval(statistics: Statistics) -> tuple[float, float] | None:
+    """Return the ends of the wider of the 95 % intervals of the relative bias [1]; None where none is known."""
+    intervals = [statistics.relative_bias_ci, statistics.relative_bias_ci_batches or (None, None)]
+    known = [(low, high) for low, high in intervals if low is not None and high is not None]
+    return max(known, key=lambda pair: pair[1] - pair[0], default=None)
 
 
 def width_to_reach(statistics: Statistics, margin: float) -> float:
     """Return the half width of the wider interval over 0.4 times `margin` [1], both relative: runs stop below 1."""
-    low, high = widest_interval(statistics)
-    return 0.5 * (high - low) / (0.4 * margin)
+    widest = widest_interval(statistics)
+    return math.inf if widest is None else 0.5 * (widest[1] - widest[0]) / (0.4 * margin)
 
 
 def pixel_angle(reference: ReferenceScene) -> float:

@@ -18,17 +18,16 @@ from numpy.typing import NDArray
 
 from reference.monte_carlo.batches import LAYERS
 from validation.estimates.monte_carlo import monte_carlo_batches
+from validation.statistics.records import Fraction, MultipleScattering
 from validation.statistics.samples import student_quantile
 
 Array = NDArray[np.float64]
 
 
-def multiple_scattering_fraction(scene, *, max_depth: int = 64, batches: int = 32, samples: int = 16) -> dict[str, Any]:
-    """Return the share of multiple scattering in the image of a Mitsuba scene at its own size, averaged over channels.
-
-    By name: that of the `medium`, of the airlight with black surfaces, light that the medium scattered twice or more;
-    that of `everything`, also light that met surfaces twice, or surfaces and the medium; each with its `value` and
-    `interval` of 95 %; and `max_depth`, `batches` and `samples`, a pixel in each.
+def multiple_scattering_fraction(
+    scene, *, max_depth: int = 64, batches: int = 32, samples: int = 16
+) -> MultipleScattering:
+    """Return the fraction of multiple scattering in the image of a Mitsuba scene at its own size.
 
     `max_depth` is the most edges of a path, 3 at least: of n scatterings by the medium at most albedo^n of the light is
     left, so 64 lacks little but in a thick medium whose albedo is close to 1. Valid for scenes that volpath can trace.
@@ -40,20 +39,20 @@ def multiple_scattering_fraction(scene, *, max_depth: int = 64, batches: int = 3
         for depth in (2, max_depth)
     )
     airlight = LAYERS.index("airlight")
-    return {
-        "medium": left_out(single[:, airlight], whole[:, airlight]),
-        "everything": left_out(single.sum(axis=1), whole.sum(axis=1)),
-        "max_depth": max_depth,
+    return MultipleScattering(
+        medium=left_out(single[:, airlight], whole[:, airlight]),
+        everything=left_out(single.sum(axis=1), whole.sum(axis=1)),
+        max_depth=max_depth,
         **how,
-    }
+    )
 
 
-def left_out(part: Array, whole: Array) -> dict[str, Any]:
+def left_out(part: Array, whole: Array) -> Fraction:
     """Return 1 - part/whole with its 95 % interval, from image means of paired batches, (batches,); 0 without light."""
     count = len(whole)
     if not whole.mean() > 0:
-        return {"value": 0.0, "interval": (0.0, 0.0)}
+        return Fraction(0.0, (0.0, 0.0))
     ratio = float(part.mean() / whole.mean())
     error = float((part - ratio * whole).std(ddof=1) / np.sqrt(count) / whole.mean())
     half = student_quantile(0.975, count - 1) * error
-    return {"value": 1 - ratio, "interval": (1 - ratio - half, 1 - ratio + half)}
+    return Fraction(1 - ratio, (1 - ratio - half, 1 - ratio + half))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import Image
+from validation.columns import plain
 from validation.engine.judged_layer import judged_layer
 from validation.engine.seen import Progress, Seen, at_places, best_kind, pixel_kinds, seen_image
 from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
@@ -27,7 +28,6 @@ from validation.fit.solve import (
 )
 from validation.fit.unknowns import AXES, CHANNELS, Unknown, read_unknowns
 from validation.fog_model.radiance import scene_fog
-from validation.metrics.errors import plain
 from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]

@@ -7,6 +7,7 @@ kernel alone) and from the wall clock (launch and replay included). Errors are o
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -27,6 +28,7 @@ from validation.clock import time_repeated, timing_of
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE, Kernel, relative_error
 from validation.kernels.rays import wide_rays
+from validation.kernels.records import ErrorLevel, KernelCost, RayTime
 from validation.study.configuration import find_kernel, sized, split_name
 
 Progress = Callable[[int, int, str], None]
@@ -47,22 +49,19 @@ SIZES: dict[str, tuple[int, ...]] = {
 _MOST_STEPS = 64  # of marching, timed on all rays; on fewer in proportion where there are more
 
 
-Cost = dict[str, Any]  # see `measure`
-
-
 def bench_kernels(
     names: Sequence[str] | None = None,
     *,
     phases: Sequence[tuple[str, float]] = PHASES,
     progress: Progress | None = None,
-) -> list[Cost]:
+) -> list[KernelCost]:
     """Measure kernels, all of the registry by default: 'name' stands for all its sizes, 'name-N' for one.
 
     Of the phase functions, with their g, the first is measured with all sizes, the others with the default sizes.
     """
     ladders = [_ladder(name) for name in names or KERNELS]
     total = len(ladders) * len(phases)
-    costs: list[Cost] = []
+    costs: list[KernelCost] = []
     for number, (phase, g) in enumerate(phases):
         reference, timed = wide_rays(ERROR_RAYS, phase, g), wide_rays(RAYS, phase, g, reference=False)
         for done, (family, default, sizes) in enumerate(ladders):
@@ -70,26 +69,16 @@ def bench_kernels(
                 progress(number * len(ladders) + done, total, f"{family}, {phase}")
             for size in sizes if number == 0 else (default,):
                 cost = measure(family, size, reference=reference, timed=timed)
-                if cost["refused"] is None or size == default:  # a size that the kernel does not have is left out
+                if cost.refused is None or size == default:  # a size that the kernel does not have is left out
                     costs.append(cost)
     return costs
 
 
-def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, seconds: float = 0.3) -> Cost:
-    """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function.
-
-    Returns
-    -------
-    dict
-        The `kernel`, its `family` and `size`, `phase` and `g`; how many `rays` were timed, and the times a ray [ns] of
-        the `device`, the kernel alone, and of the `wall` clock, with launch and replay, each with its `median`, the
-        quartiles `low` and `high` and its `repetitions`; `median`, `p99` and `max` of the relative errors in float32,
-        and how many are `nonfinite`; or in `refused` the kernel's words.
-    """
+def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, seconds: float = 0.3) -> KernelCost:
+    """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function."""
     name, phase, g = sized(family, size), reference.phase[0], float(reference.g[0])
     function = find_kernel(name)
-    cost: Cost = {"kernel": name, "family": family, "size": size, "phase": phase, "g": g, "rays": 0, "nonfinite": 0}
-    cost |= dict.fromkeys(("device", "wall", "median", "p99", "max", "refused"))
+    cost = KernelCost(kernel=name, family=family, size=size, phase=phase, g=g)
     rays = len(timed.x0)
     if size is not None and family in KERNELS and next(iter(KERNELS[family].parameters), None) == "steps":
         rays //= max(1, size // _MOST_STEPS)
@@ -97,37 +86,36 @@ def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, se
         J = np.array(_frozen(function, reference)(), dtype=np.float64)
         device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
     except (InputError, RealtimeInputError) as reason:
-        return cost | {"refused": str(reason)}
+        return replace(cost, refused=str(reason))
     error = relative_error(J, np.asarray(reference.value), "single")
     finite = np.isfinite(error)
     median, p99, largest = np.percentile(error[finite], [50, 99, 100]).tolist() if finite.any() else [None] * 3
-    errors = {"median": median, "p99": p99, "max": largest, "nonfinite": int(np.sum(~finite))}
-    return cost | {"rays": rays, "device": device, "wall": wall} | errors
+    nonfinite = int(np.sum(~finite))
+    return replace(cost, rays=rays, device=device, wall=wall, median=median, p99=p99, max=largest, nonfinite=nonfinite)
 
 
-def speed_against_error(costs: Sequence[Cost]) -> list[dict[str, Any]]:
+def speed_against_error(costs: Sequence[KernelCost]) -> list[ErrorLevel]:
     """Return the cheapest kernel, and its cost [ns a ray], for each phase function, statistic and error level.
 
     A kernel reaches a level if its error stays at or below it; one that gave values that are not finite reaches none.
     """
     levels = []
-    for phase, statistic, level in product(dict.fromkeys(cost["phase"] for cost in costs), ("max", "p99"), LEVELS):
-        good = [cost for cost in costs if cost["phase"] == phase and _reaches(cost, statistic, level)]
+    for phase, statistic, level in product(dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS):
+        good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
         best = min(good, key=_ns, default=None)
-        of_best = {"cheapest": best and best["kernel"], "ns": best and _ns(best)}
-        levels.append({"phase": phase, "statistic": statistic, "level": level, **of_best})
+        of_best = (best.kernel, _ns(best)) if best else (None, None)
+        levels.append(ErrorLevel(phase=phase, statistic=statistic, level=level, cheapest=of_best[0], ns=of_best[1]))
     return levels
 
 
-def _reaches(cost: Cost, statistic: str, level: float) -> bool:
-    return (
-        cost["refused"] is None and cost[statistic] is not None and not cost["nonfinite"] and cost[statistic] <= level
-    )
+def _reaches(cost: KernelCost, statistic: str, level: float) -> bool:
+    error: float | None = getattr(cost, statistic)
+    return cost.refused is None and error is not None and not cost.nonfinite and error <= level
 
 
-def _ns(cost: Cost) -> float:
-    """Return what kernels are compared by [ns a ray]: the device's time where it is known."""
-    return float((cost["device"] or cost["wall"])["median"])
+def _ns(cost: KernelCost) -> float:
+    assert cost.time is not None
+    return cost.time.median
 
 
 def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
@@ -177,7 +165,7 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     return work
 
 
-def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[Cost | None, Cost]:
+def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[RayTime | None, RayTime]:
     """Return the time of the compiled kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
     whole = time_repeated(work, seconds=seconds)
     times: list[float] = []
@@ -190,8 +178,12 @@ def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[C
             dr.kernel_history_clear()
     scale = 1e6 / rays
     device, wall = (
-        {name: getattr(each, f"{name}_ms") * scale for name in ("median", "low", "high")}
-        | {"repetitions": each.repetitions}
+        RayTime(
+            median=each.median_ms * scale,
+            low=each.low_ms * scale,
+            high=each.high_ms * scale,
+            repetitions=each.repetitions,
+        )
         for each in (timing_of(times), whole)
     )
-    return device if device["median"] > 0 else None, wall
+    return device if device.median > 0 else None, wall

@@ -31,7 +31,6 @@ The allowance a is in the units of J, and it is small: relative to V it is 1e-38
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +39,7 @@ from analytic.phase import PhaseFunction, phase_from_words
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE, Values, relative_error
 from validation.kernels.rays import case_row
+from validation.kernels.records import KernelErrors
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -51,13 +51,6 @@ _NODES = 8
 _LARGEST_DEPTH = 87.0
 _FARTHEST = 2.0**63  # [m]
 _SMALLEST = {"single": 2.0**-126, "double": 2.0**-1022}
-
-
-#: Of one group of rays, by name: how many `rays` the kernel did not refuse and how many it `refused`; `median`, `p99`,
-#: `max` and `mean` of the relative errors that are finite [1], None where there is none; how many values are `nan`,
-#: `infinite` where the reference is finite, or `negative`; and the `worst` ray, that of the largest error or the first
-#: that is not finite, as a line of CSV.
-Errors = Mapping[str, Any]
 
 
 def groups(cases: Cases) -> dict[str, Rows]:
@@ -92,7 +85,7 @@ def _peak(name: str, g: float) -> float:
 
 def errors_by_group(
     cases: Cases, values: Values, precision: str, rows: Mapping[str, Rows], *, expected: Array | None = None
-) -> dict[str, Errors]:
+) -> dict[str, KernelErrors]:
     """Return the relative errors [1] of each group of rows, against what is `expected` or the value of the cases."""
     expected = cases.value if expected is None else expected
     assert expected is not None
@@ -100,7 +93,7 @@ def errors_by_group(
     return {name: _errors(cases, values, error, np.isfinite(expected), group) for name, group in rows.items()}
 
 
-def _errors(cases: Cases, values: Values, error: Array, known: Rows, group: Rows) -> Errors:
+def _errors(cases: Cases, values: Values, error: Array, known: Rows, group: Rows) -> KernelErrors:
     tried = group & values.accepted
     J, finite = values.J[tried], np.isfinite(error) & tried
     bad = tried & known & ~np.isfinite(values.J)
@@ -111,12 +104,15 @@ def _errors(cases: Cases, values: Values, error: Array, known: Rows, group: Rows
         worst = int(np.argmax(np.where(finite, error, -1.0)))
     if bad.any():
         worst = int(np.argmax(bad))
-    return {
-        "rays": int(tried.sum()),
-        "refused": int((group & ~values.accepted).sum()),
-        **{"median": median, "p99": p99, "max": largest, "mean": mean},
-        "nan": int(np.isnan(J).sum()),
-        "infinite": int((np.isinf(values.J) & known & tried).sum()),
-        "negative": int((J < 0).sum()),
-        "worst": None if worst is None else case_row(cases, worst),
-    }
+    return KernelErrors(
+        rays=int(tried.sum()),
+        refused=int((group & ~values.accepted).sum()),
+        median=median,
+        p99=p99,
+        max=largest,
+        mean=mean,
+        nan=int(np.isnan(J).sum()),
+        infinite=int((np.isinf(values.J) & known & tried).sum()),
+        negative=int((J < 0).sum()),
+        worst=None if worst is None else case_row(cases, worst),
+    )

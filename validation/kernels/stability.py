@@ -10,7 +10,6 @@ about eps (J(0, x0) + J(0, x1)), however exact the kernel: `gamma_difference` co
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from validation.kernels.case_files import Cases, read_cases
 from validation.kernels.cases import Kernel, Values, evaluate_cases
 from validation.kernels.errors import EPSILON, Rows, errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers
+from validation.kernels.records import GammaDifference, Rays, Stability
 from validation.study.configuration import find_kernel
 
 Progress = Callable[[int, int, str], None]
@@ -43,7 +43,7 @@ BAR = {
 
 def stability(
     names: Sequence[str] | None = None, *, count: int = 100_000, progress: Progress | None = None
-) -> list[dict[str, Any]]:
+) -> list[Stability]:
     """Study kernels, all of the registry by default, on the certified rays and on so many generated ones."""
     chosen = [(name, find_kernel(name)) for name in names or KERNELS]  # refuse a wrong name before any work
     sets = {name: read_cases(certified_data(name)) for name in CERTIFIED} | {GENERATED: hard_rays(count)}
@@ -56,17 +56,8 @@ def stability(
     return results
 
 
-def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: Cases) -> dict[str, Any]:
-    """Study one kernel on sets of rays with known J, the generated ones among them, and on slivers.
-
-    Returns
-    -------
-    dict
-        The `kernel`, and whether it claims to be `exact`; its words by phase functions that it `refused`; the `sets`,
-        each with its `name`, the `columns` of the lines `worst`, and by group of rays the errors in `single` and in
-        `double` precision, and of `single_against_double` of the same source; `gamma`, see `gamma_difference`, by
-        precision; and what is `broken`, the bars that a kernel which claims to be exact does not keep.
-    """
+def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: Cases) -> Stability:
+    """Study one kernel on sets of rays with known J, the generated ones among them, and on slivers."""
     exact = claims_exact(name)
     broken: list[str] = []
     studied = []
@@ -75,13 +66,13 @@ def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: 
         values = {precision: evaluate_cases(cases, function, precision) for precision in PRECISIONS}
         refused |= values["single"].refused
         rows = groups(cases)
-        errors: dict[str, Any] = {each: errors_by_group(cases, values[each], each, rows) for each in PRECISIONS}
+        errors = {each: errors_by_group(cases, values[each], each, rows) for each in PRECISIONS}
         both = errors_by_group(cases, values["single"], "single", rows, expected=values["double"].J)
-        studied.append({"name": label, "columns": ",".join(cases.header), **errors, "single_against_double": both})
+        studied.append(Rays(name=label, columns=",".join(cases.header), **errors, single_against_double=both))
         if exact:
             broken += _broken(label, cases, values)
     gamma = {precision: gamma_difference(function, thin, precision) for precision in PRECISIONS}
-    return {"kernel": name, "exact": exact, "refused": refused, "sets": studied, "gamma": gamma, "broken": broken}
+    return Stability(kernel=name, exact=exact, refused=refused, sets=tuple(studied), gamma=gamma, broken=tuple(broken))
 
 
 def claims_exact(name: str) -> bool:
@@ -89,12 +80,8 @@ def claims_exact(name: str) -> bool:
     return name == "exact" or bool(getattr(KERNELS.get(name), "exact", False))
 
 
-def gamma_difference(function: Kernel, cases: Cases, precision: str) -> dict[str, Any]:
-    """Compare J(x0, x1) with J(0, x1) - J(0, x0).
-
-    The errors of both are `direct` and `difference`; `median_rounding` and `max_rounding` are the error of the
-    difference in units of eps (J(0, x0) + J(0, x1)).
-    """
+def gamma_difference(function: Kernel, cases: Cases, precision: str) -> GammaDifference:
+    """Compare J(x0, x1) with J(0, x1) - J(0, x0)."""
     direct = evaluate_cases(cases, function, precision)
     start = np.zeros(len(cases.x0))
     far = evaluate_cases(replace(cases, x0=start), function, precision)
@@ -106,12 +93,12 @@ def gamma_difference(function: Kernel, cases: Cases, precision: str) -> dict[str
         rounding = np.abs(J - cases.value) / (EPSILON[precision] * (np.abs(far.J) + np.abs(near.J)))
     everything = {"all": np.ones(len(J), dtype=bool)}
     finite = rounding[np.isfinite(rounding)]
-    return {
-        "direct": errors_by_group(cases, direct, precision, everything)["all"],
-        "difference": errors_by_group(cases, replace(direct, J=J), precision, everything)["all"],
-        "median_rounding": float(np.median(finite)) if len(finite) else None,
-        "max_rounding": float(finite.max()) if len(finite) else None,
-    }
+    return GammaDifference(
+        direct=errors_by_group(cases, direct, precision, everything)["all"],
+        difference=errors_by_group(cases, replace(direct, J=J), precision, everything)["all"],
+        median_rounding=float(np.median(finite)) if len(finite) else None,
+        max_rounding=float(finite.max()) if len(finite) else None,
+    )
 
 
 def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
@@ -136,11 +123,11 @@ def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
         ]
     faults = []
     for what, errors, quantile, limit in limits:
-        value = errors[quantile]
+        value = getattr(errors, quantile)
         if value is not None and value > limit:
-            at = f" at {errors['worst']}" if quantile == "max" else ""
+            at = f" at {errors.worst}" if quantile == "max" else ""
             faults.append(f"{name}: {what} {value:.3g} > {limit:g}{at}")
     for precision, errors in (("float32", single["all"]), ("float64", double["all"])):
-        counts = {"NaN": errors["nan"], "infinite": errors["infinite"], "negative": errors["negative"]}
+        counts = {"NaN": errors.nan, "infinite": errors.infinite, "negative": errors.negative}
         faults += [f"{name}: {precision}: {number} {what}" for what, number in counts.items() if number]
     return faults

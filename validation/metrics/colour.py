@@ -38,7 +38,7 @@ PQ_PEAK = 10000.0  #: the brightest that PQ encodes [cd/m^2]
 
 @dataclass(frozen=True)
 class ColourDifference:
-    """Colour difference of two images (see the module); NaN if no pixel is finite in both."""
+    """Colour difference of two images (see the module); none is known if no pixel is finite in both."""
 
     exposure: float = column("exposure", "stops", "the radiance was multiplied by 2 to this power")
     white_luminance: float = column("white", "cd/m^2", "of the screen of Delta E ITP")
@@ -47,12 +47,12 @@ class ColourDifference:
     nonfinite: int = column("not finite", "pixels", "left out because either image is NaN or infinite there")
     clipped: int = column("clipped", "pixels", "of which either image is outside [0, 1], which CIEDE2000 sees")
     clipped_itp: int = column("clipped, ITP", "pixels", "of which either image is outside what Delta E ITP sees")
-    ciede2000_mean: float = column("CIEDE2000", "1", "mean CIEDE2000")
-    ciede2000_p99: float = column("CIEDE2000, p99", "1", "99 % quantile of CIEDE2000")
-    ciede2000_max: float = column("CIEDE2000, largest", "1", "largest CIEDE2000")
-    itp_mean: float = column("Delta E ITP", "1", "mean Delta E ITP")
-    itp_p99: float = column("Delta E ITP, p99", "1", "99 % quantile of Delta E ITP")
-    itp_max: float = column("Delta E ITP, largest", "1", "largest Delta E ITP")
+    ciede2000_mean: float | None = column("CIEDE2000", "1", "mean CIEDE2000")
+    ciede2000_p99: float | None = column("CIEDE2000, p99", "1", "99 % quantile of CIEDE2000")
+    ciede2000_max: float | None = column("CIEDE2000, largest", "1", "largest CIEDE2000")
+    itp_mean: float | None = column("Delta E ITP", "1", "mean Delta E ITP")
+    itp_p99: float | None = column("Delta E ITP, p99", "1", "99 % quantile of Delta E ITP")
+    itp_max: float | None = column("Delta E ITP, largest", "1", "largest Delta E ITP")
 
 
 def colour_difference(
@@ -128,8 +128,8 @@ def _ictcp(luminance: Array) -> Array:
     return colour.RGB_to_ICtCp(np.maximum(luminance @ wide.T, 0), method="ITU-R BT.2100-2 PQ", L_p=PQ_PEAK)
 
 
-def _summary(values: Array) -> tuple[float, float, float]:
+def _summary(values: Array) -> tuple[float | None, float | None, float | None]:
     """Return the mean, the 99 % quantile and the largest."""
     if not values.size:
-        return (float("nan"),) * 3
+        return None, None, None
     return float(values.mean()), float(np.quantile(values, 0.99)), float(values.max())

@@ -11,7 +11,7 @@ Channels count as values of their own: nothing is summed or weighted over them. 
 image, so that every relative number is free of units, and dim airlight counts as much as bright.
 """
 
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,13 +33,13 @@ class Metrics:
     """
 
     pixels: int = column("pixels", "pixels", "compared, those of the mask, with or without finite values")
-    bias: float = column("bias", RADIANCE, "mean error")
-    relative_bias: float = column("rel. bias", "1", "mean error over the mean of the reference: below 0 is too dark")
-    rmse: float = column("RMSE", RADIANCE, "root of the mean square error")
-    relative_rmse: float = column("rel. RMSE", "1", "root of the mean square error over the mean of the reference")
-    p50: float = column("median error", "1", f"half of the values err by less: {_RELATIVE}")
-    p99: float = column("p99", "1", f"99 of 100 values err by less: {_RELATIVE}")
-    max: float = column("max", "1", f"all values err by at most: {_RELATIVE}")
+    bias: float | None = column("bias", RADIANCE, "mean error")
+    relative_bias: float | None = column("rel. bias", "1", "mean error over the reference's mean: below 0 is too dark")
+    rmse: float | None = column("RMSE", RADIANCE, "root of the mean square error")
+    relative_rmse: float | None = column("rel. RMSE", "1", "root of the mean square error over the reference's mean")
+    p50: float | None = column("median error", "1", f"half of the values err by less: {_RELATIVE}")
+    p99: float | None = column("p99", "1", f"99 of 100 values err by less: {_RELATIVE}")
+    max: float | None = column("max", "1", f"all values err by at most: {_RELATIVE}")
     nonfinite: int = column("not finite", "pixels", "with NaN or infinity in either image; left out of every average")
     negative: int = column("negative", "pixels", "with a negative value in the test image; they stay in the averages")
 
@@ -66,7 +66,7 @@ def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | No
     Returns
     -------
     Metrics
-        In float64. If no pixel is finite in both images, every error is NaN; if the reference is black, the relative
+        In float64. If no pixel is finite in both images, every error is None; if the reference is black, the relative
         ones are. Quantiles are linear between order statistics.
 
     Raises InputError if the sizes differ, an image is empty, or the mask does not fit or leaves nothing.
@@ -78,9 +78,7 @@ def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | No
         "nonfinite": int(chosen.sum() - finite.sum()),
         "negative": int((chosen & (tst < 0).any(axis=2)).sum()),
     }
-    found: dict[str, Any] = dict.fromkeys(
-        ("bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max"), float("nan")
-    )
+    found: dict[str, Any] = dict.fromkeys(("bias", "relative_bias", "rmse", "relative_rmse", "p50", "p99", "max"))
     if finite.any():
         r, d = ref[finite], tst[finite] - ref[finite]
         mean, largest = float(r.mean()), float(np.abs(d).max())
@@ -93,6 +91,13 @@ def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | No
             found |= {"relative_bias": found["bias"] / mean, "relative_rmse": rmse / mean}
             found |= {"p50": p50, "p99": p99, "max": float(relative.max())}
     return Metrics(**counts, **found)
+
+
+def known(value: float | None) -> float:
+    """Return a number that must be known, such as the error against a reference that is not black."""
+    if value is None:
+        raise InputError("an error is not known: no pixel is finite in both images, or the reference is black")
+    return value
 
 
 def compared(
@@ -135,23 +140,6 @@ def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
             f"an image of {image.shape[2]} channels has no colour; wanted one (grey) or three (linear RGB)"
         )
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
-
-
-def plain(value: Any) -> Any:
-    """Return dataclasses, containers and numbers as JSON holds them: no NumPy types, None for what is not finite."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return plain(asdict(value))
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
 
 
 def _size(image: NDArray[np.float64]) -> str:

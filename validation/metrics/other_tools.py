@@ -42,7 +42,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
-from validation.columns import column
+from validation.columns import column, record_of
 from validation.metrics.errors import FLOOR, RADIANCE, compared
 
 Array = NDArray[np.float64]
@@ -60,21 +60,21 @@ class PublishedErrors:
     values: int = column("values", "1", "compared")
     nonfinite: int = column("not finite", "pixels", "left out because either image is NaN or infinite there")
     dark: int = column("dark values", "1", "whose reference is below 0.001 of its mean")
-    mse: float = column("MSE", "unit^2", "mean square error")
-    rmse: float = column("RMSE", "unit", "root of the mean square error")
-    mae: float = column("MAE", "unit", "mean absolute error")
-    rae_tev: float = column("RAE (tev)", "1", "tev's relative absolute error")
-    rse_tev: float = column("RSE (tev)", "1", "tev's relative squared error")
-    mrse_pbrt: float = column("MRSE (pbrt)", "1", "pbrt's MRSE")
-    relmse: float = column("relMSE", "1", "SimpleImageIO's relative MSE")
-    relmse_trim: float = column("relMSE, trimmed", "1", "that without the largest 0.1 % of the values")
-    mape: float = column("MAPE", "1", "JERI's MAPE")
-    smape: float = column("SMAPE", "1", "JERI's SMAPE")
-    mrse_jeri: float = column("MRSE (JERI)", "1", "JERI's MRSE")
-    psnr: float = column("PSNR", "dB", "peak signal to noise, with the reference's peak; none for equal images")
-    relative: float = column("relative", "1", "mean of |error| over the reference where that is not dark")
-    relative_max: float = column("relative, largest", "1", "largest of the same")
-    dark_max: float = column("in the dark", "1", "largest |error| of dark values, over the mean of the reference")
+    mse: float | None = column("MSE", "unit^2", "mean square error")
+    rmse: float | None = column("RMSE", "unit", "root of the mean square error")
+    mae: float | None = column("MAE", "unit", "mean absolute error")
+    rae_tev: float | None = column("RAE (tev)", "1", "tev's relative absolute error")
+    rse_tev: float | None = column("RSE (tev)", "1", "tev's relative squared error")
+    mrse_pbrt: float | None = column("MRSE (pbrt)", "1", "pbrt's MRSE")
+    relmse: float | None = column("relMSE", "1", "SimpleImageIO's relative MSE")
+    relmse_trim: float | None = column("relMSE, trimmed", "1", "that without the largest 0.1 % of the values")
+    mape: float | None = column("MAPE", "1", "JERI's MAPE")
+    smape: float | None = column("SMAPE", "1", "JERI's SMAPE")
+    mrse_jeri: float | None = column("MRSE (JERI)", "1", "JERI's MRSE")
+    psnr: float | None = column("PSNR", "dB", "peak signal to noise, with the reference's peak; none for equal images")
+    relative: float | None = column("relative", "1", "mean of |error| over the reference where that is not dark")
+    relative_max: float | None = column("relative, largest", "1", "largest of the same")
+    dark_max: float | None = column("in the dark", "1", "largest |error| of dark values, over the reference's mean")
 
 
 def published_errors(
@@ -85,8 +85,8 @@ def published_errors(
     Images and mask are those of `validation.metrics.errors.error_metrics`. The `unit` is the radiance that counts as 1;
     None for the mean of the reference over the pixels compared, or 1 if that is not above zero.
 
-    If no pixel is finite in both images, every error is NaN. Negative values stay in, and a denominator that they make
-    zero gives an infinite error. If the reference is black, `relative`, `dark_max` and `psnr` are NaN.
+    If no pixel is finite in both images, no error is known. Negative values stay in; an error whose denominator they
+    make zero is not known. Nor are, if the reference is black, `relative`, `dark_max` and `psnr`.
     """
     if unit is not None and not 0 < unit < np.inf:
         raise InputError(f"unit: got {unit}, wanted a radiance above 0, or none for the mean of the reference")
@@ -98,7 +98,7 @@ def published_errors(
         unit = mean if mean > 0 else 1.0
     counts = {"values": r.size, "nonfinite": int(chosen.sum() - finite.sum())}
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return PublishedErrors(unit=unit, **counts, **_errors(r / unit, t / unit), **_without_floor(r, t))
+        return record_of({"unit": unit} | counts | _errors(r / unit, t / unit) | _without_floor(r, t), PublishedErrors)
 
 
 def _errors(r: Array, t: Array) -> dict[str, Any]:

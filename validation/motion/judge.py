@@ -26,11 +26,11 @@ from reference.scene.camera import film_positions
 from reference.scene.read import ReferenceScene, read_reference
 from reference.storage.exr import NOTE, read_exr
 from reference.storage.files import temporary_folder
+from validation.columns import plain
 from validation.engine.judge import lamp_distance, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import PIXELS, Progress, pixel_kinds, scene_of_size
 from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import plain
 from validation.motion.blocks import BLOCK, told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from validation.motion.measures import AGES, Measures, Sequence, measure

@@ -41,11 +41,11 @@ from scipy.stats import nct
 
 from analytic.errors import InputError
 from reference.storage.exr import read_exr
+from validation.columns import plain
 from validation.engine.images import image_times
 from validation.engine.judge import references, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import Progress, pixel_kinds, scene_of_size
-from validation.metrics.errors import plain
 from validation.motion.blocks import Estimate, parts_of_error, told
 from validation.statistics.samples import student, student_quantile
 

@@ -30,7 +30,7 @@ from realtime.scene.camera import read_camera
 from realtime.scene.read_scene import Scene, read_scene
 from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import error_metrics
+from validation.metrics.errors import error_metrics, known
 from validation.scenes.loading import load_scene
 from validation.study.configuration import Configuration, configuration, prepared
 from validation.study.frame_times import first_frame, moved_light
@@ -68,7 +68,7 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         whole = reference.airlight + reference.surface
         chosen = as_published("taylor", white=float(np.quantile(whole.max(axis=-1), 0.999)), cone=cone)
         frame = render_frame(prepared(read_scene(small), chosen))
-        errors.append(error_metrics(whole, frame.airlight + frame.surface).p50)
+        errors.append(known(error_metrics(whole, frame.airlight + frame.surface).p50))
         published, ours = prepared(scene, chosen), prepared(scene, configuration("shadow-planes", "exact"))
         works = [moved_light(published), moved_light(ours)]
         stages = _stage_works(published, "taylor") if staged else []

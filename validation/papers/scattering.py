@@ -26,7 +26,7 @@ from realtime.scene.read_scene import Scene, read_scene
 from reference.monte_carlo.batches import LAYERS
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.metrics.errors import error_metrics
+from validation.metrics.errors import error_metrics, known
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera
 from validation.scenes.registry import SCENES
@@ -51,8 +51,8 @@ def multiple_scattering() -> dict[str, Any]:
     described["fog"]["scale"] = _THIN
     scene = mi.load_dict(described)
     resize(scene, _SIZE)
-    thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES)["medium"]
-    return {"left over": max(map(_left_over, _SCENES)), "thin": [thin["value"], *thin["interval"]]}
+    thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
+    return {"left over": max(map(_left_over, _SCENES)), "thin": [thin.value, *thin.interval]}
 
 
 def _left_over(name: str) -> float:
@@ -108,8 +108,9 @@ def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
         paper, taylor, printed = (
             error_metrics(exact, _airlight(scene, *form), mask=exact[..., 1] > 0) for form in forms
         )
-        biases.append(abs(paper.relative_bias))
-        ratios.append((taylor.relative_rmse / paper.relative_rmse, printed.relative_rmse / paper.relative_rmse))
+        biases.append(abs(known(paper.relative_bias)))
+        error = known(paper.relative_rmse)
+        ratios.append((known(taylor.relative_rmse) / error, known(printed.relative_rmse) / error))
     polynomial, printed_form = zip(*ratios)
     return {
         "largest bias": max(biases),

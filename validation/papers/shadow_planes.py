@@ -23,7 +23,7 @@ from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_reference
 from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import Metrics, error_metrics
+from validation.metrics.errors import Metrics, error_metrics, known
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera, fog, point_light
 from validation.study.configuration import configuration, prepared
@@ -41,11 +41,11 @@ def orders() -> dict[str, float]:
     paper = {scene: _error(scene, {"order": "paper"}) for scene in SCENES}
     unshadowed = error_metrics(_reference("hall"), _rendered("hall", {}, method="unshadowed"))
     return {
-        "hall, unshadowed": unshadowed.relative_rmse,
-        "clutter, no order": _error("clutter", {"order": "none"}).relative_rmse,
-        "hall, paper's order": paper["hall"].relative_rmse,
-        "paper's order, largest": max(error.relative_rmse for error in paper.values()),
-        "paper's order, p99": max(error.p99 for error in paper.values()),
+        "hall, unshadowed": known(unshadowed.relative_rmse),
+        "clutter, no order": known(_error("clutter", {"order": "none"}).relative_rmse),
+        "hall, paper's order": known(paper["hall"].relative_rmse),
+        "paper's order, largest": max(known(error.relative_rmse) for error in paper.values()),
+        "paper's order, p99": max(known(error.p99) for error in paper.values()),
     }
 
 
@@ -63,7 +63,8 @@ def shortcuts() -> dict[str, float]:
         image = _rendered("clutter", {"buffer": "8bit", "white": white})
         below = true < white
         biases[f"{name}, bias"] = float((image - true)[below].sum() / true[below].sum())
-    return {"near, steps": _steps(), "vertex": _error("two-pens", {"evaluation": "vertex"}).relative_rmse, **biases}
+    vertex = _error("two-pens", {"evaluation": "vertex"})
+    return {"near, steps": _steps(), "vertex": known(vertex.relative_rmse), **biases}
 
 
 def _steps() -> float:

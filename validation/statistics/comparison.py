@@ -65,7 +65,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
+from validation.columns import record_of
 from validation.metrics.errors import compared
+from validation.statistics.records import Statistics
 from validation.statistics.samples import (
     binomial_p,
     bonferroni,
@@ -105,45 +107,6 @@ class _Side:
         return variance**2 / (self.batches - 1) if self.batches else np.zeros_like(variance)
 
 
-@dataclass(frozen=True)
-class Statistics:
-    """Agreement of two images with standard errors; every number stays if both radiances are scaled.
-
-    If the images agree and the standard errors are right, z has the mean 0 and, for K batches, the standard deviation
-    sqrt((K - 1)/(K - 3)). Numbers "expected" are those of images that agree.
-    """
-
-    masked: int  #: pixels that the mask leaves out
-    tested: int  #: values with a z
-    zero_reference: int  #: values where the reference is zero
-    zero_reference_error: float  #: the largest |test| among them over the mean of the reference
-    zero_variance: int  #: values without variance
-    zero_variance_error: float  #: the largest |test - ref| among them over the mean of the reference
-    z_mean: float
-    z_std: float
-    rejected: int  #: pixels with a value rejected at Sidak's level
-    expected_rejections: float
-    exceeding: int  #: values below `plain_level`
-    expected_exceeding: float
-    exceeding_p: float  #: p-value of `exceeding`, both tails
-    blocks: int  #: of 8 x 8 pixels, one channel each
-    rejected_blocks: int  #: at Sidak's level for their number
-    uniformity_p: float  #: p-value of the test that the p-values are uniform
-    relative_bias: float  #: sum(test) / sum(ref) - 1
-    relative_bias_ci: tuple[float, float]  #: its 95 % interval from the standard errors
-    relative_bias_ci_batches: tuple[float, float] | None  #: that from the batch means
-    relative_bias_se: float  #: from the standard errors of the pixels
-    relative_bias_freedom: float  #: degrees of freedom of that
-    relative_bias_p: float  #: two-sided
-    reference_variance_share: float  #: of the reference in the variance of `relative_bias`; the rest is the test's
-    largest_share: float  #: of one pixel in that variance; above 1 % the interval is doubtful
-    detectable_bias: float  #: smallest that is found with 90 % power at the 5 % level, by the wider interval
-    margin: float | None
-    equivalent: bool | None  #: whether all intervals lie within the margin
-    family_level: float
-    plain_level: float
-
-
 def compare_statistics(
     reference: Estimate,
     test: Estimate,
@@ -181,16 +144,17 @@ def compare_statistics(
     tested = _side("test", test, chosen, scale=scale, with_batches=whole)
     bias = _relative_bias(expected, tested, int(chosen.sum()))
     intervals = [bias["relative_bias_ci"], bias["relative_bias_ci_batches"] or bias["relative_bias_ci"]]
-    return Statistics(
-        masked=int((~asked).sum()),
+    found = {
+        "masked": (~asked).sum(),
         **_value_tests(expected, tested, chosen, family_level, plain_level),
         **_block_tests(expected, tested, family_level),
         **bias,
-        margin=margin,
-        equivalent=None if margin is None else all(-margin < low and high < margin for low, high in intervals),
-        family_level=family_level,
-        plain_level=plain_level,
-    )
+        "margin": margin,
+        "equivalent": None if margin is None else all(-margin < low and high < margin for low, high in intervals),
+        "family_level": family_level,
+        "plain_level": plain_level,
+    }
+    return record_of(found, Statistics)
 
 
 def _value_tests(
@@ -293,7 +257,7 @@ def _side(name: str, estimate: Estimate, chosen: NDArray[np.bool_], *, scale: fl
 
 
 def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]:
-    """Pool the error of all pixels into one relative bias; everything is NaN if the reference is not bright."""
+    """Pool the error of all pixels into one relative bias; nothing of it is known if the reference is not bright."""
     numbers = ("relative_bias", "relative_bias_se", "relative_bias_freedom", "relative_bias_p")
     found: dict[str, Any] = dict.fromkeys(numbers, np.nan)
     found |= dict.fromkeys(("reference_variance_share", "largest_share", "detectable_bias"), np.nan)

@@ -2,7 +2,6 @@
 """The times of a frame and of its stages, and of frames after light, objects or colours changed."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
@@ -28,8 +27,7 @@ from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
 from validation.clock import Took, stopwatch, time_repeated, timed, timing_of
-from validation.columns import column
-from validation.timing import Timing
+from validation.timing import FrameTimes, Timing
 
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
 #: or more frames would take minutes.
@@ -85,36 +83,6 @@ def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: boo
 def first_frame(renderer: FrameRenderer) -> FrameCache:
     """Render the frame of the renderer's scene and return its cache for the next frame."""
     return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
-
-
-@dataclass(frozen=True)
-class FrameTimes:
-    """The times of a frame and of its stages [ms]."""
-
-    frame: Timing = column("frame", "ms", "a whole frame while nothing moves: shadow maps or planes are there")
-    airlight: Timing = column("airlight", "ms", "airlight: the kernel with its ray set-up, or the marching")
-    surface: Timing | None = column("rays + surface", "ms", "camera rays and lit surface", default=None)
-    light_moved: Timing | None = column(
-        "light moved", "ms", "a frame after the light moved: shadow maps or planes again, all stages", default=None
-    )
-    objects_moved: Timing | None = column(
-        "objects moved", "ms", "a frame after the objects moved too: acceleration structure", default=None
-    )
-    light_moved_camera_cached: Timing | None = column(
-        "light moved, camera rays kept",
-        "ms",
-        "a frame after the light moved, with the camera rays of the last frame",
-        default=None,
-    )
-    colours_changed: Timing | None = column(
-        "colours changed", "ms", "a frame after only medium or colours changed", default=None
-    )
-
-    @property
-    def medians(self) -> dict[str, float]:
-        """The medians of the times that were measured, by name [ms]."""
-        times = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {name: timing.median_ms for name, timing in times.items() if timing is not None}
 
 
 def time_frame(

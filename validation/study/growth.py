@@ -53,11 +53,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import linregress
 
-from validation.metrics.errors import plain
+from validation.columns import record_of
 from validation.study.ladders import Step
 from validation.study.row import Row
 from validation.study.run import run
 from validation.study.study import Cell, Study
+from validation.timing import Scaling, TimeGrowth
 
 TIMES = ("frame", "light_moved", "objects_moved")
 CLIFF = 0.6  #: steeper than the exponent by so much: 4 times the work then takes 2.3 times as long as it may
@@ -71,20 +72,13 @@ USUAL = {
     "map": (1.0, 2.0, 2.0),
 }
 
-Record = dict[str, Any]
-
 
 def study_growth(
     study: Study, kind: str, steps: Sequence[Step], *, progress: Callable[[int, int, str], None] | None = None
-) -> list[Record]:
+) -> list[Scaling]:
     """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`, in the first scene.
 
-    Returns
-    -------
-    list of dict
-        For each method its `scene` with the `size` of its images, its `label` and the `kind`; `costs`, by step the
-        `work`, the `TIMES`, those of the camera `rays` alone and the `memory`; `growth`, by name of `TIMES`, see
-        `growth`; and in `refused` why there are no more steps, or None.
+    A method ends at the first step that it refuses.
     """
     name, rows = study.scenes[0], list[list[Row]]([] for _ in study.configurations)
     for number, step in enumerate(steps):
@@ -97,42 +91,40 @@ def study_growth(
             if progress is not None:
                 done = number * len(rows) + place + 1
                 progress(done, len(steps) * len(rows), f"{kind} {step.work:g}, {chosen.label}")
-    of = {"scene": Path(name).stem, "size": list(study.sizes[0]), "kind": kind}
-    return [of | {"label": each.label} | _record(own, kind) for each, own in zip(study.configurations, rows)]
+    found = []
+    for chosen, own in zip(study.configurations, rows):
+        costs: list[dict[str, Any]] = [
+            {**row.times.measured, "work": row.work.amount, "rays": row.work.rays, "memory": row.memory}
+            for row in own
+            if row.times is not None and row.work is not None
+        ]
+        works = [cost["work"] for cost in costs]
+        times = {each: [cost[each].median_ms for cost in costs] for each in TIMES}
+        scaling = {
+            "scene": Path(name).stem,
+            "size": study.sizes[0],
+            "label": chosen.label,
+            "kind": kind,
+            "costs": costs,
+            "growth": {each: growth(kind, each, works, values) for each, values in times.items()},
+            "refused": own[-1].reason,
+        }
+        found.append(record_of(scaling, Scaling))
+    return found
 
 
-def _record(rows: Sequence[Row], kind: str) -> Record:
-    """Return what the steps of a method cost, and how its times grow."""
-    costs: list[Record] = []
-    for row in rows:
-        if row.times is not None and row.work is not None:
-            times = {name: plain(getattr(row.times, name)) for name in TIMES} | {"rays": plain(row.work.rays)}
-            costs.append({"work": row.work.amount, "memory": row.memory} | times)
-    works = [cost["work"] for cost in costs]
-    times = {name: growth(kind, name, works, [cost[name]["median_ms"] for cost in costs]) for name in TIMES}
-    return {"costs": costs, "growth": times, "refused": rows[-1].reason}
-
-
-def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float]) -> Record:
-    """Return how one of `TIMES`, [ms] at steps of a kind of work, the least first, grows with the work.
-
-    Returns
-    -------
-    dict
-        The `exponent`, None for fewer than two steps, and its `standard_error` from the scatter about the line, None
-        for fewer than three; the `steepest` exponent between two steps that follow one another, the work of the second
-        of them, `at`, and whether that is a `cliff`, more than it may be.
-    """
+def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float]) -> TimeGrowth:
+    """Return how one of `TIMES`, [ms] at steps of a kind of work, the least first, grows with the work."""
     exponent, standard_error = fitted_exponent(works, times)
     steps = list(pairwise(zip(works, times)))
     local = [
         (math.log(after / before) / math.log(second / first), second) for (first, before), (second, after) in steps
     ]
-    steepest, at = max(local, default=(math.nan, math.nan))
+    steepest, at = max(local, default=(None, None))
     most = USUAL[kind][TIMES.index(name)] + CLIFF
     cliff = any(slope > most and after > _SHORT for (slope, _), (_, (_, after)) in zip(local, steps))
     found = {"exponent": exponent, "standard_error": standard_error, "steepest": steepest, "at": at, "cliff": cliff}
-    return dict(plain(found))
+    return record_of(found, TimeGrowth)
 
 
 def fitted_exponent(works: ArrayLike, values: ArrayLike) -> tuple[float, float]:

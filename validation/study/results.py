@@ -14,17 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.storage.kept import Kept, load, stopwatch, store
+from validation.columns import plain
 
 _DATA = "data"  # the name of the array that holds the data as JSON
 
-Computed = tuple[Any, Mapping[str, NDArray[Any]]]  #: data and arrays
+Computed = tuple[Any, Mapping[str, NDArray[Any]]]  #: data, records among it, and arrays
 
 
 @dataclass(frozen=True)
 class Result:
     """A result, and whether it was there already."""
 
-    data: Any  #: what JSON can hold
+    data: Any  #: as JSON holds it
     arrays: Mapping[str, NDArray[Any]] = field(repr=False)
     made: float  #: when it was computed [s since 1970]
     seconds: float  #: to compute it from nothing [s]
@@ -44,7 +45,7 @@ def cached_result(
     if found is None:
         spent = stopwatch()
         data, arrays = compute()
-        text = json.dumps(data, allow_nan=False).encode()
+        text = json.dumps(plain(data), allow_nan=False).encode()
         whole = {**arrays, _DATA: np.frombuffer(text, dtype=np.uint8)}
         found = store(key, whole, spent()) if worth(data) else Kept(whole, spent(), time.time(), False)
     return _result(found)

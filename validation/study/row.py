@@ -14,13 +14,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from validation.columns import Column, column, columns_of, values_of
+from validation.columns import Column, column, columns_of, plain, values_of
 from validation.metrics.colour import ColourDifference
-from validation.metrics.errors import RADIANCE, Metrics, RunsError, plain
+from validation.metrics.errors import RADIANCE, Metrics, RunsError
 from validation.metrics.flip import Flip
 from validation.metrics.other_tools import PublishedErrors
-from validation.study.frame_times import FrameTimes
-from validation.timing import Timing
+from validation.timing import FrameTimes, Timing
 
 #: What came of a cell. 'done': numbers; 'refused': the method, or the reference, says that it cannot do this scene, and
 #: `reason` why; 'left out': a frame would take too long; 'failed': an exception; 'hung': stopped at the time limit;

@@ -23,13 +23,14 @@ from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image
 from reference.storage.kept import Kept, is_kept, key_of
+from validation.columns import record_of
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.estimates.quadrature import has_reference, kept_reference, reference_image
-from validation.metrics.errors import plain
-from validation.metrics.flip import flip_hdr
+from validation.metrics.flip import Flip, flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
+from validation.statistics.records import Agreement, MultipleScattering
 from validation.study.configuration import Configuration, configuration_work, user_code
 from validation.study.cost import reference_work, sampled_work
 from validation.study.reference import of_image
@@ -37,6 +38,7 @@ from validation.study.results import Computed, Result, cached_result
 from validation.study.row import Row
 from validation.study.run import Apart, cell_row, layered_frame, run
 from validation.study.study import Cell, Study
+from validation.timing import FrameTimes
 
 if TYPE_CHECKING:  # what only reports of images need is imported there
     from validation.engine.images import EngineImage
@@ -141,9 +143,9 @@ class SceneStudy:
 class Judged:
     """A row of a scene, and its image."""
 
-    row: Mapping[str, Any]  #: a `Row` as JSON has it
+    row: Row
     image: Image | None = None  #: its layers; None if there is none
-    expected: Array | None = None  #: what its layer `row["layer"]` was compared with, (height, width, 3) [W/(m^2 sr)]
+    expected: Array | None = None  #: what its layer `row.layer` was compared with, (height, width, 3) [W/(m^2 sr)]
     whole: Array | None = None  #: what all of its light is compared with by HDR-FLIP; None where nobody asks
     results: tuple[Result, ...] = ()  #: that it was made of
 
@@ -161,8 +163,8 @@ class SceneResult:
 
     study: SceneStudy
     reference: ReferenceImage
-    agreement: Mapping[str, Any]  #: by estimator and layer, `validation.estimates.agreement.Agreement` as JSON has it
-    multiple: Mapping[str, Any]  #: of `validation.estimates.multiple_scattering`
+    agreement: Mapping[str, Agreement]  #: by estimator and layer, as `volpath airlight`
+    multiple: MultipleScattering
     rows: tuple[Judged, ...]
     seconds: Mapping[str, float]  #: that its parts took when they were computed
     results: tuple[Result, ...] = field(repr=False, default=())  #: every part, as it was kept
@@ -194,7 +196,7 @@ def study_scene(
     reference, kept = study.kept_reference
     made = Result({}, {}, kept.made, round(kept.spent.seconds, 3), kept.loaded)
     progress("checks")
-    checks = cached_result(_checks_key(study), lambda: (plain(check_reference(study, spread=spread)), {}))
+    checks = cached_result(_checks_key(study), lambda: (check_reference(study, spread=spread), {}))
     progress("multiple scattering")
     multiple = cached_result(_multiple_key(study), partial(_multiple, study))
     rows = []
@@ -208,7 +210,9 @@ def study_scene(
     results = (made, checks, multiple, *(result for row in rows for result in row.results))
     seconds = {"reference": made.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
     seconds["methods"] = round(sum(result.seconds for result in results[3:]), 3)
-    return SceneResult(study, reference, checks.data, multiple.data, tuple(rows), seconds, results)
+    agreement = {name: record_of(each, Agreement) for name, each in checks.data.items()}
+    found = record_of(multiple.data, MultipleScattering)
+    return SceneResult(study, reference, agreement, found, tuple(rows), seconds, results)
 
 
 def configurations_for(features: SceneFeatures, configurations: Sequence[Configuration]) -> tuple[Configuration, ...]:
@@ -223,7 +227,7 @@ def configurations_for(features: SceneFeatures, configurations: Sequence[Configu
     return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
 
 
-def check_reference(study: SceneStudy, *, spread: ElsewhereFor | None = None) -> dict[str, Any]:
+def check_reference(study: SceneStudy, *, spread: ElsewhereFor | None = None) -> dict[str, Agreement]:
     """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
     checks = study.study.checks
     with study.at(checks.size) as scene:
@@ -250,7 +254,7 @@ def _multiple_key(study: SceneStudy) -> str:
 def _multiple(study: SceneStudy) -> Computed:
     batches, samples = study.study.checks.multiple
     with study.at(_MULTIPLE) as scene:
-        return plain(multiple_scattering_fraction(scene, batches=batches, samples=samples)), {}
+        return multiple_scattering_fraction(scene, batches=batches, samples=samples), {}
 
 
 def _cell_key(study: SceneStudy, chosen: Configuration) -> str:
@@ -262,25 +266,26 @@ def _measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> 
     """Return the row and the image of a configuration."""
     row, frame = run(study.cell(chosen), study.scene, of_image(study.reference), timed_scene=study.timed, apart=apart)
     if frame is None:
-        return plain(row), {}
-    return plain(row), {"airlight": frame.airlight, "surface": frame.surface, "depth": frame.distance, **frame.extra}
+        return row, {}
+    return row, {"airlight": frame.airlight, "surface": frame.surface, "depth": frame.distance, **frame.extra}
 
 
 def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: Mapping[Configuration, str]) -> Judged:
     if chosen in ended:
-        row = plain(cell_row(study.cell(chosen), status="refused", reason=ended[chosen]))
+        row = cell_row(study.cell(chosen), status="refused", reason=ended[chosen])
         return Judged(row, results=(Result(row, {}, time.time(), 0.0, False),))
     _ = study.reference  # loaded or computed now: it is no part of the time of a configuration
     # A fault of the user's method may have gone by the next run.
-    worth = (lambda row: row["status"] == "done") if chosen.own else (lambda row: True)
+    worth = (lambda row: row.status == "done") if chosen.own else (lambda row: True)
     result = cached_result(_cell_key(study, chosen), partial(_measured, study, chosen, apart), worth=worth)
+    row = record_of(result.data, Row)
     if not result.arrays:
-        return Judged(result.data, results=(result,))
+        return Judged(row, results=(result,))
     airlight, surface, distance = (result.arrays[name] for name in ("airlight", "surface", "depth"))
     extra = {name: array for name, array in result.arrays.items() if name not in ("airlight", "surface", "depth")}
     image = layered_frame(study.name, chosen, Frame(airlight, surface, distance, extra))
     whole = study.reference.airlight + study.reference.surface if study.study.wants_flip(chosen) else None
-    return Judged(result.data, image, study.reference.airlight, whole, (result,))
+    return Judged(row, image, study.reference.airlight, whole, (result,))
 
 
 def _with_flip(judged: Judged) -> Judged:
@@ -291,14 +296,15 @@ def _with_flip(judged: Judged) -> Judged:
 
     def compute() -> Computed:
         flip, error_map = flip_hdr(*shown)
-        return plain(flip), {} if error_map is None else {"map": error_map}
+        return flip, {} if error_map is None else {"map": error_map}
 
     result = cached_result(key_of("flip", flip_hdr, images=shown, version=_flip_version()), compute)
     image = judged.image
     if "map" in result.arrays:
         grey = np.repeat(result.arrays["map"][:, :, None], 3, axis=2)
         image = replace(image, layers=dict(image.layers) | {"flip": grey})
-    return replace(judged, row={**judged.row, "flip": result.data}, image=image, results=(*judged.results, result))
+    row = replace(judged.row, flip=record_of(result.data, Flip))
+    return replace(judged, row=row, image=image, results=(*judged.results, result))
 
 
 def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
@@ -319,7 +325,8 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     layers = {name.removeprefix(_LAYER): array for name, array in result.arrays.items() if name.startswith(_LAYER)}
     attributes = {"airlight:scene": study.name, "airlight:image": shown.path.name}
     whole = None if study.study.flip == "none" else result.arrays.get("whole")
-    return Judged(result.data, Image(layers, attributes=attributes), result.arrays["expected"], whole, (result,))
+    image, row = Image(layers, attributes=attributes), record_of(result.data, Row)
+    return Judged(row, image, result.arrays["expected"], whole, (result,))
 
 
 def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
@@ -344,6 +351,7 @@ def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
         pixel=judged.pixel,
         error=judged.comparison.metrics,
         surface_error=surface,
+        times=None if timed is None else FrameTimes(timed[0]),
     )
     arrays: dict[str, Any] = {f"{_LAYER}{name}": values for name, values in layers.items()}
     arrays["expected"], reference = judged.reference, judged.fit.reference
@@ -351,8 +359,7 @@ def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
         arrays["whole"] = judged.reference
     elif "surface" in layers or not np.any(reference.surface > 0):
         arrays["whole"] = reference.airlight + reference.surface
-    times = {} if timed is None else {"times": {"frame": plain(timed[0])}}
-    return plain(row) | times, arrays
+    return row, arrays
 
 
 def _flip_version() -> str:

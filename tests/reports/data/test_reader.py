@@ -80,7 +80,7 @@ def test_a_number_that_is_not_finite_is_refused_with_its_place(folder, number):
 def test_the_schema_has_every_record_with_its_meaning():
     made = schema()
     assert made["$defs"]["Scene"]["properties"]["purpose"]["description"] == "what it is for"
-    assert "frame" in made["$defs"]["Times"]["required"]
+    assert "frame" in made["$defs"]["FrameTimes"]["required"]
     assert "stability" in made["$defs"]["Report"]["required"]
 
 

@@ -3,11 +3,11 @@ import copy
 
 import pytest
 
-from reports.data.records import Agreement
 from reports.report import claims as made
 from reports.tables.agreement import verdict
 from tests.helpers.reports import agreement, checked, entry, record_of, report_of, scene
 from tests.helpers.reports import refused as refused_entry
+from validation.statistics.records import Agreement
 
 
 def method(label, rmse, median, *, refused=None):
@@ -56,7 +56,7 @@ def test_claims_on_a_reference_that_is_confirmed():
     assert claims([]) == []
     data = scenes()
     data[1]["agreement"]["airlight"] = agreed(True, 0.0042, margin=0.0125)
-    assert "lies within its margin of ±0.5 % or ±1.25 %;" in texts(data)[0]
+    assert "fills most of its margin, 20 %, is +0..+0.1 %, in fog (airlight, ±0.5 %)." in texts(data)[0]
 
 
 @pytest.mark.claim("claims-follow")
@@ -64,7 +64,7 @@ def test_claims_on_a_reference_that_is_not_confirmed():
     data = scenes()
     data[1]["agreement"]["surface"]["statistics"]["equivalent"] = False
     trust = texts(data)[0]
-    assert "NOT confirmed within ±0.5 % by Mitsuba's volpath in hall (surface)" in trust
+    assert "NOT confirmed by Mitsuba's volpath in hall (surface, ±0.5 %)" in trust
     assert "fog" not in trust
 
 
@@ -80,8 +80,8 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_reference():
     first = claims(data)[0]
     assert first.good is None
     assert "confirmed by Mitsuba's volpath in 2 of 3 comparisons" in first.text
-    assert "not decided within the time in hall (airlight)" in first.text
-    assert "the worst is +0..+0.1 %, in fog (airlight)" in first.text  # of those that were decided
+    assert "not decided within the time in hall (airlight, ±0.5 %)" in first.text
+    assert "is +0..+0.1 %, in fog (airlight, ±0.5 %)" in first.text  # of those that were decided
     # No other estimator says anything about the airlight of the hall.
     assert not confirmed(data)
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
@@ -92,7 +92,7 @@ def test_out_of_time_can_still_speak_against_the_reference():
     data = scenes()
     data[1]["agreement"]["airlight"] = out_of_time([0.006, 0.03])
     assert verdict(record_of(data[1]["agreement"]["airlight"], Agreement)) is False
-    assert "NOT confirmed within ±0.5 %" in claims(data)[0].text
+    assert "NOT confirmed by" in claims(data)[0].text
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
     assert not confirmed(data)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reports.report.scene import reference_record
-from validation.metrics.errors import plain
+from validation.columns import plain
 
 
 @dataclass(frozen=True)

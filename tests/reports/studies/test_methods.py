@@ -11,6 +11,8 @@ from reference.storage.files import temporary_folder
 from reports.commands import main as cli
 from tests.helpers.api import TINY, brighter
 from tests.helpers.reports import growth_record
+from validation.columns import record_of
+from validation.timing import Scaling
 
 
 def printed(capfd, *arguments, status=0):
@@ -74,7 +76,9 @@ def test_scaling_that_jumps_ends_with_1_and_is_drawn(variant, capfd, monkeypatch
     arguments += ["-o", str(tmp_path / "growth.png")]
     for jump, status in ((False, 0), (True, 1)):
         found = growth_record(cliff=jump) | {"scene": "sphere-spot"}
-        monkeypatch.setattr("validation.study.growth.study_growth", lambda *given, found=found, **options: [found])
+        monkeypatch.setattr(
+            "validation.study.growth.study_growth", lambda *given, found=found, **options: [record_of(found, Scaling)]
+        )
         assert printed(capfd, *arguments, status=status)["scaling"] == [found]
         assert (tmp_path / "growth.png").stat().st_size > 1000
 

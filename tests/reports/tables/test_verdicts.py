@@ -3,10 +3,11 @@
 
 import pytest
 
-from reports.data.records import Agreement, Scaling
 from reports.tables.agreement import verdict
 from reports.tables.scaling import cliffs, scaling_tables
 from tests.helpers.reports import agreement, growth_record, record_of
+from validation.statistics.records import Agreement
+from validation.timing import Scaling
 
 
 @pytest.mark.parametrize(

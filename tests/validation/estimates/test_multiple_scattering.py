@@ -36,12 +36,12 @@ def test_share_grows_with_the_optical_depth(variant):
     thin, thick = (
         multiple_scattering_fraction(scene(sigma_t=s), max_depth=6, batches=6, samples=8) for s in (0.01, 0.6)
     )
-    assert 0 < thin["medium"]["value"] < 0.1 < thick["medium"]["value"] < 1
-    assert thick["everything"]["value"] > 0
-    for share in (thin["medium"], thick["medium"], thick["everything"]):
-        low, high = share["interval"]
-        assert low < share["value"] < high
-    assert (thin["batches"], thin["samples"], thin["max_depth"]) == (6, 8, 6)
+    assert 0 < thin.medium.value < 0.1 < thick.medium.value < 1
+    assert thick.everything.value > 0
+    for share in (thin.medium, thick.medium, thick.everything):
+        low, high = share.interval
+        assert low < share.value < high
+    assert (thin.batches, thin.samples, thin.max_depth) == (6, 8, 6)
 
 
 @pytest.mark.claim("left-out-share")
@@ -55,6 +55,6 @@ def test_the_interval_holds_the_share_in_95_of_100_runs():
     for _ in range(4000):
         part = rng.normal(0.8, 0.08, 16)
         whole = part + rng.normal(0.2, 0.02, 16)
-        low, high = left_out(part, whole)["interval"]
+        low, high = left_out(part, whole).interval
         held += low <= 0.2 <= high
     assert abs(held - 3800) < 55

@@ -19,6 +19,7 @@ from validation.kernels.case_files import read_cases
 from validation.kernels.cases import TABLE, Values, evaluate_cases, integrate_cases, summary, write_results
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, slivers, table, wide_rays
+from validation.kernels.records import KernelCost, RayTime
 from validation.kernels.stability import GENERATED, _broken, gamma_difference, kernel_stability
 
 
@@ -47,12 +48,12 @@ def test_errors_are_counted_by_group():
     values = Values(np.array([1.1, 2.0, -4.0, 8.0]), {}, np.ones(4, dtype=bool))
     errors = errors_by_group(rays, values, "single", groups(rays))
     assert list(errors) == ["all", "a", "b", "phase hg", "phase isotropic"]
-    assert errors["all"]["max"] == 2.0
-    assert errors["all"]["negative"] == 1
-    assert errors["all"]["worst"].startswith("b,isotropic,0.0,1.0,1.0,0.0,3.0,1.0,4.0")
-    assert errors["a"]["max"] == pytest.approx(0.1)
-    assert errors["a"]["mean"] == pytest.approx(0.05)
-    assert (errors["phase hg"]["rays"], errors["phase hg"]["max"]) == (1, 0.0)
+    assert errors["all"].max == 2.0
+    assert errors["all"].negative == 1
+    assert errors["all"].worst.startswith("b,isotropic,0.0,1.0,1.0,0.0,3.0,1.0,4.0")
+    assert errors["a"].max == pytest.approx(0.1)
+    assert errors["a"].mean == pytest.approx(0.05)
+    assert (errors["phase hg"].rays, errors["phase hg"].max) == (1, 0.0)
 
 
 @pytest.mark.parametrize("error", [InputError, RealtimeInputError])
@@ -77,22 +78,22 @@ def test_small_relative_mistake_is_found_where_it_is(variant):
         return dr.select(geometry.foot < 0, 1.001 * J, J)
 
     verdict = study(wrong_behind)
-    tags = verdict["sets"][0]["double"]
-    assert tags["behind"]["median"] == pytest.approx(1e-3, rel=1e-3)
-    assert tags["thin"]["max"] < 1e-4
-    assert verdict["sets"][0]["single"]["all"]["worst"].split(",")[0] in ("behind", "infinite")
+    tags = verdict.sets[0].double
+    assert tags["behind"].median == pytest.approx(1e-3, rel=1e-3)
+    assert tags["thin"].max < 1e-4
+    assert verdict.sets[0].single["all"].worst.split(",")[0] in ("behind", "infinite")
     # Both precisions have the same mistake: they agree.
-    assert verdict["sets"][0]["single_against_double"]["behind"]["median"] < 1e-6
-    assert (verdict["exact"], verdict["broken"]) == (False, [])
+    assert verdict.sets[0].single_against_double["behind"].median < 1e-6
+    assert (verdict.exact, verdict.broken) == (False, ())
 
 
 @pytest.mark.claim("exact-keeps-its-bar")
 def test_kernel_that_claims_to_be_exact_is_held_to_it(variant):
     verdict = study(gauss, "exact")
-    assert verdict["exact"]
-    assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in verdict["broken"])
-    assert any("float64 maximum" in words for words in verdict["broken"])
-    assert not any("NaN" in words or "negative" in words for words in verdict["broken"])
+    assert verdict.exact
+    assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in verdict.broken)
+    assert any("float64 maximum" in words for words in verdict.broken)
+    assert not any("NaN" in words or "negative" in words for words in verdict.broken)
 
 
 def test_negative_and_missing_values_break_the_claim(variant):
@@ -100,7 +101,7 @@ def test_negative_and_missing_values_break_the_claim(variant):
         J = gauss(geometry, x0, x1, medium, light)
         return dr.select(geometry.foot < 0, -J, dr.select(x0 > 0, dr.nan, J))
 
-    words = study(bad, "exact")["broken"]
+    words = study(bad, "exact").broken
     for precision in ("float32", "float64"):
         assert any(precision in sentence and "negative" in sentence for sentence in words)
         assert any(precision in sentence and "NaN" in sentence for sentence in words)
@@ -110,9 +111,9 @@ def test_negative_and_missing_values_break_the_claim(variant):
 def test_differences_of_gamma_lose_what_theory_says(variant):
     """Rounding of the two terms, each to about half an epsilon, over their difference."""
     loss = gamma_difference(gauss, slivers(256), "single")
-    assert loss["direct"]["max"] < 1e-4
-    assert loss["difference"]["median"] > 1e-3
-    assert 0.05 < loss["median_rounding"] < 5
+    assert loss.direct.max < 1e-4
+    assert loss.difference.median > 1e-3
+    assert 0.05 < loss.median_rounding < 5
 
 
 # Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A processor that
@@ -214,9 +215,9 @@ def test_written_rows_are_those_of_the_source_with_their_results(data_folder, tm
 
 
 def cost(family, size, ns, error, **others):
-    spread = {"median": ns, "low": ns, "high": ns, "repetitions": 5}
-    errors = {"p99": error / 10, "max": error, "nonfinite": 0, "refused": None}
-    return {"kernel": f"{family}-{size}", "phase": "isotropic", "device": spread, "wall": spread} | errors | others
+    time = RayTime(median=ns, low=ns, high=ns, repetitions=5)
+    name = {"kernel": f"{family}-{size}", "family": family, "size": size, "phase": "isotropic", "g": 0.0}
+    return KernelCost(**name, device=time, wall=time, p99=error / 10, max=error, **others)
 
 
 COSTS = (
@@ -229,38 +230,38 @@ COSTS = (
 
 
 def level(levels, statistic, value):
-    return next(each for each in levels if (each["statistic"], each["level"]) == (statistic, value))
+    return next(each for each in levels if (each.statistic, each.level) == (statistic, value))
 
 
 def test_cheapest_kernel_of_each_level():
     levels = speed_against_error(COSTS)
     assert len(levels) == 12
     coarse, fine, finest = (level(levels, "max", value) for value in (1e-1, 1e-2, 1e-6))
-    assert (coarse["cheapest"], coarse["ns"]) == ("table-64", 4.0)
-    assert fine["cheapest"] == "quadrature-8"
-    assert (finest["cheapest"], finest["ns"]) == (None, None)
+    assert (coarse.cheapest, coarse.ns) == ("table-64", 4.0)
+    assert fine.cheapest == "quadrature-8"
+    assert (finest.cheapest, finest.ns) == (None, None)
     # 99 % of the rays are ten times better here.
-    assert level(levels, "p99", 1e-2)["cheapest"] == "table-64"
-    assert level(levels, "p99", 1e-6)["cheapest"] == "quadrature-16"
+    assert level(levels, "p99", 1e-2).cheapest == "table-64"
+    assert level(levels, "p99", 1e-6).cheapest == "quadrature-16"
 
 
 def test_values_that_are_not_finite_reach_no_level():
     fast = cost("taylor", 4, 1.0, 1e-7, nonfinite=1)
-    assert level(speed_against_error([*COSTS, fast]), "max", 1e-1)["cheapest"] == "table-64"
+    assert level(speed_against_error([*COSTS, fast]), "max", 1e-1).cheapest == "table-64"
 
 
 def test_measured_errors_and_times_are_those_of_the_kernel(variant):
     reference, timed = wide_rays(512), wide_rays(4096, reference=False)
     coarse, fine = (measure("quadrature", n, reference=reference, timed=timed, seconds=0.05) for n in (4, 16))
     names = ("kernel", "family", "size", "rays")
-    assert [fine[name] for name in names] == ["quadrature-16", "quadrature", 16, 4096]
+    assert [getattr(fine, name) for name in names] == ["quadrature-16", "quadrature", 16, 4096]
     # The certified bound of 16 nodes is 4e-6; float32 rounds exponents of up to 60.
-    assert fine["max"] < 3e-5 < coarse["max"]
-    assert fine["nonfinite"] == 0
-    for spread in (fine["device"], fine["wall"]):
-        assert 0 < spread["low"] <= spread["median"] <= spread["high"]
-        assert spread["repetitions"] >= 5
-    assert coarse["refused"] is None
+    assert fine.max < 3e-5 < coarse.max
+    assert fine.nonfinite == 0
+    for spread in (fine.device, fine.wall):
+        assert 0 < spread.low <= spread.median <= spread.high
+        assert spread.repetitions >= 5
+    assert coarse.refused is None
 
 
 COLUMNS = ("g", "foot", "height", "x0", "x1", "sigma_t")

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from validation.columns import plain
 from validation.metrics.colour import ciede2000, colour_difference, delta_e_itp
-from validation.metrics.errors import error_metrics, plain
+from validation.metrics.errors import error_metrics
 from validation.metrics.other_tools import PublishedErrors, published_errors
 
 EXACT = 1e-14  # some roundings of double precision

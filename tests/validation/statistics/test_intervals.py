@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from reports.data.records import Growth, Times
 from tests.helpers.calibration import power
 from tests.helpers.reports import record_of, sampled, times
 from validation.statistics.noise import (
@@ -27,7 +26,7 @@ from validation.statistics.samples import (
     sidak,
     student_quantile,
 )
-from validation.timing import Timing
+from validation.timing import FrameTimes, TimeGrowth, Timing
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 12), (12, 12), (3, 40), (992, 1000), (0, 0)])
@@ -144,7 +143,7 @@ def test_spread_is_the_geometric_mean_of_the_quartiles():
 
 
 def test_more_work_is_seen_in_all_that_contains_it():
-    old, new = (record_of(times(1.0), Times).stages for _ in range(2))
+    old, new = (record_of(times(1.0), FrameTimes).measured for _ in range(2))
     for stage in ("airlight", "frame", "light_moved", "objects_moved"):
         new[stage] = record_of(sampled([old[stage].median_ms + 0.7] * 20), Timing)
     assert slower_stages(old, new, least=1.25, scale=1.0) == ["airlight", "frame"]
@@ -165,7 +164,7 @@ def test_more_work_is_seen_in_all_that_contains_it():
 )
 def test_another_power_is_beyond_tolerance_and_scatter(old, new, differs):
     fits = [
-        Growth(exponent=exponent, standard_error=error, steepest=None, at=None, cliff=False)
+        TimeGrowth(exponent=exponent, standard_error=error, steepest=None, at=None, cliff=False)
         for exponent, error in (old, new)
     ]
     assert other_power(*fits) == pytest.approx(differs)

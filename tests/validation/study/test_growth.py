@@ -18,23 +18,23 @@ from validation.study.study import Measure, Study
 def test_a_power_is_found_and_is_no_cliff(exponent):
     works = [1000 * 4**level for level in range(5)]
     found = growth("map", "light_moved", works, [7.3 * work**exponent for work in works])
-    assert found["exponent"] == pytest.approx(exponent, abs=1e-12)
-    assert found["steepest"] == pytest.approx(exponent, abs=1e-12)
-    assert not found["cliff"]
+    assert found.exponent == pytest.approx(exponent, abs=1e-12)
+    assert found.steepest == pytest.approx(exponent, abs=1e-12)
+    assert not found.cliff
 
 
 def test_a_jump_is_a_cliff():
     """The times of shadow planes before their wedges: 17 times the time for 4 times the triangles."""
     works = [20480, 81920, 327680, 1310720, 5242880]
     found = growth("triangles", "frame", works, [57, 81, 128, 2148, 5645])
-    assert found["cliff"]
-    assert found["at"] == 1310720
-    assert found["steepest"] == pytest.approx(np.log(2148 / 128) / np.log(4))
+    assert found.cliff
+    assert found.at == 1310720
+    assert found.steepest == pytest.approx(np.log(2148 / 128) / np.log(4))
     # The same after them, and light volumes: none.
-    assert not growth("triangles", "frame", works, [57, 81, 128, 259, 512])["cliff"]
-    assert not growth("triangles", "frame", works, [32, 34, 38, 39, 45])["cliff"]
+    assert not growth("triangles", "frame", works, [57, 81, 128, 259, 512]).cliff
+    assert not growth("triangles", "frame", works, [32, 34, 38, 39, 45]).cliff
     # Short times are those of launches: a jump of them says nothing.
-    assert not growth("triangles", "frame", works, [0.1, 0.1, 0.1, 3.9, 4.1])["cliff"]
+    assert not growth("triangles", "frame", works, [0.1, 0.1, 0.1, 3.9, 4.1]).cliff
 
 
 @pytest.mark.parametrize(
@@ -61,16 +61,16 @@ def test_a_study_measures_every_step_and_says_who_refuses(variant):
     )
     found = study_growth(study, "map", steps, progress=lambda *done: told.append(done))
     measured, refused = found
-    assert (measured["scene"], measured["size"], measured["label"]) == (
+    assert (measured.scene, measured.size, measured.label) == (
         "sphere-spot",
-        [24, 18],
+        (24, 18),
         "light-volumes (exact)",
     )
-    assert [cost["work"] for cost in measured["costs"]] == [128, 256]
-    assert all(cost[name]["median_ms"] > 0 for cost in measured["costs"] for name in ("frame", "rays"))
-    assert measured["refused"] is None
-    assert refused["costs"] == []
-    assert "map" in refused["refused"]
+    assert [cost.work for cost in measured.costs] == [128, 256]
+    assert all(getattr(cost, name).median_ms > 0 for cost in measured.costs for name in ("frame", "rays"))
+    assert measured.refused is None
+    assert refused.costs == ()
+    assert "map" in refused.refused
     assert told[-1][:2] == (4, 4)
 
 
