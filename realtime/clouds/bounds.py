@@ -22,7 +22,6 @@ import numpy as np
 
 from realtime.numerics.array_types import Metres, PerRay, aligned_array, four_numbers
 from realtime.scene.closed_mesh import shape_number
-from realtime.scene.media.bounded import Clouds
 from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
 from realtime.scene.read_scene import Scene
 
@@ -123,38 +122,3 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
         cloud,
         normal,
     )
-
-
-def optical_depths(
-    surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, active=True, first: Crossing | None = None
-) -> tuple[Any, ...]:
-    """Return the optical depth of rays up to a distance in all clouds, by channel [1].
-
-    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`: rays in any precision [m] and
-    their unit directions; `end`: where they end, may be infinite [m]; `active`: lanes to compute; the others have a
-    depth of 0; `first`: their first crossing, if it is known.
-    """
-    Float = type(direction.x)
-    lanes = max(dr.width(direction), dr.width(origin))
-
-    def deeper(depths, begin, crossing, going):
-        inside = going & crossing.leaves
-        length = dr.select(inside, dr.minimum(crossing.distance, end) - begin, 0)
-        return tuple(
-            dr.fma(dr.gather(Float, sigma_t, crossing.cloud, inside), length, depth)
-            for sigma_t, depth in zip(clouds.sigma_t, depths, strict=True)
-        )
-
-    def step(x, depths, going):
-        crossing = next_crossing(surfaces, origin, direction, x, going)
-        return crossing.distance, deeper(depths, x, crossing, going), going & (crossing.distance < end)
-
-    x, depths = dr.zeros(Float, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
-    going = dr.full(mi.Bool, True, lanes) & active & (x < end)
-    if first is not None:
-        depths = deeper(depths, x, first, going)
-        x, going = +first.distance, going & (first.distance < end)
-    _, depths, _ = dr.while_loop(
-        state=(x, depths, going), cond=lambda x, depths, going: going, body=step, labels=("x", "depths", "going")
-    )
-    return depths

@@ -81,14 +81,13 @@ def light_depths(
     dr.eval(origin, direction, texel)
     nothing = dr.full(Float, dr.inf, SIZE * SIZE), dr.zeros(Float, SIZE * SIZE)
 
-    def full_step(total, x, number, inside):
-        return stride * voxel(clouds, number, inside)
+    def full_step(total, x, number):
+        return stride * voxel(clouds, number)
 
-    def widen(total, begin, end, number, inside):
+    def widen(total, begin, end, number):
         first, last = total
-        rho = middle_density(clouds, origin, direction, begin, end, number, inside)
-        there = inside & (number == cloud) & (rho > 0)
-        return (dr.select(there, dr.minimum(first, begin), first), dr.select(there, end, last)), inside
+        there = (number == cloud) & (middle_density(clouds, origin, direction, begin, end, number) > 0)
+        return (dr.select(there, dr.minimum(first, begin), first), dr.select(there, end, last)), mi.Bool(True)
 
     first, last = march(surfaces, origin, direction, Float(dr.inf), nothing, step=full_step, add=widen)
     there = dr.isfinite(first)
@@ -96,15 +95,15 @@ def light_depths(
     dr.eval(first, last)
     lengths = dr.zeros(Float, SIZE * SIZE * (LAYERS + 1))
 
-    def to_layer(total, x, number, inside):
+    def to_layer(total, x, number):
         layer, *_ = total
         ahead = first + (last - first) * dr.square(Float(layer + 1) / LAYERS) - x
-        return dr.minimum(dr.maximum(ahead, 0), full_step(total, x, number, inside))
+        return dr.minimum(dr.maximum(ahead, 0), full_step(total, x, number))
 
-    def add(total, begin, end, number, inside):
+    def add(total, begin, end, number):
         layer, length = total
-        own = inside & (number == cloud)
-        rho = middle_density(clouds, origin, direction, begin, end, number, own)
+        own = number == cloud
+        rho = middle_density(clouds, origin, direction, begin, end, number)
         length = dr.select(own, dr.fma(rho, end - begin, length), length)
         # A step ends at a layer's end at the latest, or a rounding of the distance behind it.
         share = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
@@ -112,7 +111,7 @@ def light_depths(
         # What the next layer has if the ray leaves the cloud before it; a later step writes over it.
         dr.scatter(lengths, length, texel * (LAYERS + 1) + dr.minimum(reached + 1, LAYERS), own)
         dr.scatter(lengths, length, texel * (LAYERS + 1) + reached, own & (reached > layer))
-        return (dr.select(inside, dr.maximum(layer, reached), layer), length), inside & (end < last)
+        return (dr.maximum(layer, reached), length), end < last
 
     nothing = dr.zeros(mi.UInt32, SIZE * SIZE), dr.zeros(Float, SIZE * SIZE)
     march(surfaces, origin, direction, last, nothing, step=to_layer, add=add, active=there)

@@ -61,12 +61,12 @@ def dense_surface(
     density = clouds.density
     assert density is not None
 
-    def step(total, x, cloud, inside):
-        return stride * voxel(clouds, cloud, inside)
+    def step(total, x, cloud):
+        return stride * voxel(clouds, cloud)
 
-    def add(total, begin, finish, cloud, inside):
+    def add(total, begin, finish, cloud):
         distance, number, behind = total
-        own = inside if only is None else inside & (cloud == only)
+        own = mi.Bool(True) if only is None else cloud == only
         searches = own & ~dr.isfinite(distance)
         first = density.at(origin + direction * begin, cloud, searches)
         second = density.at(origin + direction * finish, cloud, searches)
@@ -77,11 +77,11 @@ def dense_surface(
         distance = dr.select(met, begin + share * (finish - begin), distance)
         number = dr.select(met, cloud, number)
         if only is None:
-            return (distance, number, behind), inside & ~met
-        rho = middle_density(clouds, origin, direction, begin, finish, cloud, own)
+            return (distance, number, behind), ~met
+        rho = middle_density(clouds, origin, direction, begin, finish, cloud)
         counted = own & dr.isfinite(distance)
         behind += dr.select(counted, rho * (finish - dr.maximum(begin, dr.select(counted, distance, 0))), 0)
-        return (distance, number, behind), inside
+        return (distance, number, behind), mi.Bool(True)
 
     total = (
         dr.full(Float, dr.inf, lanes),

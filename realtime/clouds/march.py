@@ -14,7 +14,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import CloudSurfaces, Crossing, next_crossing, optical_depths
+from realtime.clouds.bounds import CloudSurfaces, Crossing, next_crossing
 from realtime.numerics.array_types import Metres
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
@@ -41,52 +41,50 @@ def march(
 
     `surfaces`: the boundaries of clouds; `origin`, `direction`, `end`: rays [m], their unit directions, and where they
     end, may be infinite [m]; `total`: the sum of no step, a tuple of arrays of the rays' width; `step`: (total,
-    distance [m], cloud, active) -> how long a step may be [m]; `add`: (total, begin, end, cloud, inside) -> total, and
-    whether to go on, for steps [m] in the cloud of a number: the first in a stretch has no length, and says where it
-    begins; `active`: lanes to compute; `first`: the first crossing, if it is known.
+    distance [m], cloud) -> how long a step may be [m]; `add`: (total, begin, end, cloud) -> total, and whether to go
+    on, for steps [m] in the cloud of a number: the first in a stretch has no length, and says where it begins;
+    `active`: lanes to compute; `first`: the first crossing, if it is known. The loop changes no other lanes than those
+    that go on.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 
-    def look(x):
-        crossing = next_crossing(surfaces, origin, direction, x)
-        return crossing.distance, crossing.leaves, crossing.cloud
+    def stretch(x, crossing=None):
+        """Return where the next stretch in a cloud begins and ends; both are one place where rounding hides it."""
+        near = next_crossing(surfaces, origin, direction, x) if crossing is None else crossing
+        far = next_crossing(surfaces, origin, direction, near.distance, ~near.leaves & (near.distance < end))
+        begin = dr.select(near.leaves, x, dr.select(far.leaves, near.distance, far.distance))
+        edge = dr.select(near.leaves, near.distance, far.distance)
+        return begin, dr.minimum(edge, end), dr.select(near.leaves, near.cloud, far.cloud)
 
-    def body(x, edge, cloud, total, going):
-        # Where no stretch is open, look for the next crossing: its far end if the ray is in a cloud, else its start.
-        looks = going & (x >= edge)
-        none = Float(dr.inf), mi.Bool(False), mi.UInt32(0)
-        distance, leaves, ahead = dr.if_stmt(args=(x,), cond=looks, true_fn=look, false_fn=lambda x: none)
-        opens, jumps, steps_on = looks & leaves, looks & ~leaves, going & ~looks
-        edge = dr.select(opens, dr.minimum(distance, end), edge)
-        cloud = dr.select(opens, ahead, cloud)
-        longest = dr.maximum(step(total, x, cloud, steps_on), _SHORTEST * x)
-        target = dr.select(steps_on, dr.minimum(x + longest, edge), x)
-        inside = opens | steps_on
-        total, goes_on = add(total, x, target, cloud, inside)
-        x = dr.select(jumps, distance, target)
-        return x, edge, cloud, total, going & (x < end) & (~inside | goes_on)
+    def body(x, edge, cloud, opens, total, going):
+        longest = dr.maximum(step(total, x, cloud), _SHORTEST * x)
+        target = dr.select(opens, x, dr.minimum(x + longest, edge))
+        total, goes_on = add(total, x, target, cloud)
+        opens = goes_on & ~opens & (target >= edge) & (edge < end)
+        x, edge, cloud = dr.if_stmt(
+            args=(target, edge, cloud), cond=opens, true_fn=lambda x, *_: stretch(x), false_fn=lambda *same: same
+        )
+        return x, edge, cloud, opens, total, going & goes_on & (x < end)
 
-    zero = dr.zeros(Float, lanes)
-    # Rays that start in the open go to where they first enter a cloud.
-    x = +zero if first is None else dr.select(first.leaves, zero, first.distance)
-    going = dr.full(mi.Bool, True, lanes) & active & (x < end)
-    state = (x, +zero, dr.zeros(mi.UInt32, lanes), total, going)
+    begin, edge, cloud = stretch(dr.zeros(Float, lanes), first)
+    going = dr.full(mi.Bool, True, lanes) & active & (begin < end)
+    state = (begin, edge, cloud, dr.full(mi.Bool, True, lanes), total, going)
     *_, total, _ = dr.while_loop(state=state, cond=lambda *state: state[-1], body=body)
     return total
 
 
-def middle_density(clouds: Clouds, origin, direction, begin, end, cloud, inside) -> Any:
+def middle_density(clouds: Clouds, origin, direction, begin, end, cloud) -> Any:
     """Return rho in the middle of steps [1]."""
     if clouds.density is None:
         return 1
-    return clouds.density.at(origin + direction * (0.5 * (begin + end)), cloud, inside)
+    return clouds.density.at(origin + direction * (0.5 * (begin + end)), cloud)
 
 
-def voxel(clouds: Clouds, cloud, active) -> Metres:
+def voxel(clouds: Clouds, cloud) -> Metres:
     """Return the width of a voxel of the clouds of some numbers, infinite where they have none [m]."""
     if clouds.density is None:
         return type(clouds.sigma_t[0])(dr.inf)
-    return dr.gather(type(clouds.density.voxel), clouds.density.voxel, cloud, active)
+    return dr.gather(type(clouds.density.voxel), clouds.density.voxel, cloud)
 
 
 def depths_along(
@@ -103,25 +101,23 @@ def depths_along(
 ) -> tuple[Any, ...]:
     """Return the optical depth of rays up to a distance in all clouds, by channel [1].
 
-    `surfaces`, `clouds`, `origin`, `direction`, `end`, `active`, `first`: as for
-    `realtime.clouds.bounds.optical_depths`; `stride`: how long the first steps are in grids [voxels]; `seen`: whether
-    the depths are those of what the eye sees: there steps grow, and end behind `OPAQUE`.
+    `surfaces`, `clouds`: the boundaries, and what fills them; `origin`, `direction`, `end`, `active`, `first`: as of
+    `march`; lanes that are not active have a depth of 0; `stride`: how long the first steps are in grids [voxels];
+    `seen`: whether the depths are those of what the eye sees: there steps grow, and end behind `OPAQUE`.
     """
-    if clouds.density is None:
-        return optical_depths(surfaces, clouds, origin, direction, end, active, first)
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
+    seen &= clouds.density is not None
 
-    def step(depths, x, cloud, inside):
-        length = stride * voxel(clouds, cloud, inside)
+    def step(depths, x, cloud):
+        length = stride * voxel(clouds, cloud) if clouds.density is not None else dr.inf
         return length * dr.exp(dr.minimum(least(depths), OPAQUE) / SPREAD) if seen else length
 
-    def add(depths, begin, finish, cloud, inside):
-        rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside)
-        length = dr.select(inside, rho * (finish - begin), 0)
+    def add(depths, begin, finish, cloud):
+        length = (finish - begin) * middle_density(clouds, origin, direction, begin, finish, cloud)
         depths = tuple(
-            dr.fma(dr.gather(Float, own, cloud, inside), length, depth) for own, depth in zip(clouds.sigma_t, depths)
+            dr.fma(dr.gather(Float, own, cloud), length, depth) for own, depth in zip(clouds.sigma_t, depths)
         )
-        return depths, least(depths) < OPAQUE if seen else inside
+        return depths, least(depths) < OPAQUE if seen else mi.Bool(True)
 
     nothing = tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
     return march(surfaces, origin, direction, end, nothing, step=step, add=add, active=active, first=first)

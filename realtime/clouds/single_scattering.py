@@ -51,19 +51,20 @@ the same sum with u = tau + a l.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import CloudSurfaces, Crossing, next_crossing, optical_depths
+from realtime.clouds.bounds import CloudSurfaces, Crossing, next_crossing
 from realtime.clouds.march import OPAQUE, SPREAD, depths_along, least, march, middle_density, voxel
 from realtime.numerics.array_types import PerRay, chosen_value
+from realtime.numerics.functions import exp_bounded, exp_expm1_bounded
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 
-_SERIES = 0.02  # below it (1 - exp(-d))/d is summed up: d^4/120 is left, 1e-9
+_LAST = 1.0001  # times the share of a step: rounding leaves none behind the last
 
 
 def opacity_of(depths: tuple[Any, ...], Color) -> Any:
@@ -127,38 +128,34 @@ def light_once(
     """
     clouds, Float, Color = rays.clouds, type(rays.direction.x), type(rays.clouds.albedo)
     channels, lanes = len(clouds.sigma_t), dr.width(rays.direction)
-    full = rays.depths
+    way, full = (rays.surfaces, rays.origin, rays.direction, rays.end), rays.depths
     if clouds.density is not None:
-        full = optical_depths(rays.surfaces, clouds, rays.origin, rays.direction, rays.end, first=rays.first)
+        even = replace(clouds, density=None)
+        full = depths_along(way[0], even, *way[1:], stride=stride, seen=False, first=rays.first)
     mean = sum(full) / (channels * SPREAD)
     # In thin clouds 1 - exp(-T) is lost in rounding; the first two terms of its series, which it exceeds, are not.
-    share = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) / steps
+    share = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) * (_LAST / steps)
 
-    def step(total, x, cloud, inside):
+    def step(total, x, cloud):
         depths, *_ = total
-        kappa = sum(dr.gather(Float, own, cloud, inside) for own in clouds.sigma_t) / channels
-        growth = dr.exp(dr.minimum(sum(depths) / channels, OPAQUE) / SPREAD)
+        kappa = sum(dr.gather(Float, own, cloud) for own in clouds.sigma_t) / channels
+        growth = exp_bounded(dr.minimum(sum(depths) / channels, OPAQUE) / SPREAD)
         part = share * growth
         ahead = SPREAD * dr.maximum(part, -dr.log(dr.maximum(1 - part, 1e-30)))
         node = dr.select((part < 1) & (kappa > 0), ahead / kappa, dr.inf)
-        return dr.minimum(node, stride * voxel(clouds, cloud, inside) * growth)
+        return node if clouds.density is None else dr.minimum(node, stride * voxel(clouds, cloud) * growth)
 
-    def add(total, begin, end, cloud, inside):
+    def add(total, begin, end, cloud):
         depths, legs, lit, sums = total
-        next_legs, next_lit = reaching(rays, beams, end, inside)
-        rho = middle_density(clouds, rays.origin, rays.direction, begin, end, cloud, inside)
-        length = dr.select(inside, rho * (end - begin), 0)
-        own = tuple(dr.gather(Float, sigma_t, cloud, inside) * length for sigma_t in clouds.sigma_t)
+        next_legs, next_lit = reaching(rays, beams, end)
+        length = (end - begin) * middle_density(clouds, rays.origin, rays.direction, begin, end, cloud)
+        own = tuple(dr.gather(Float, sigma_t, cloud) * length for sigma_t in clouds.sigma_t)
         after = tuple(depth + part for depth, part in zip(depths, own))
         shown = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
         ends = (depths, after), (legs, next_legs)
-        # Where a stretch begins, so do the legs.
-        sums = with_step(clouds, beams, sums, own, *ends, shown, cloud, inside & (end > begin), printed=printed)
-        legs = tuple(
-            tuple(dr.select(inside, new, old) for new, old in zip(*pair)) for pair in zip(next_legs, legs, strict=True)
-        )
-        lit = tuple(dr.select(inside, new, old) for new, old in zip(next_lit, lit, strict=True))
-        return (after, legs, lit, sums), least(after) < OPAQUE
+        # Where a stretch begins, so do the legs: its first step has no length.
+        sums = with_step(clouds, beams, sums, own, *ends, shown, cloud, end > begin, printed=printed)
+        return (after, next_legs, next_lit, sums), least(after) < OPAQUE
 
     def zeros(count: int):
         return tuple(dr.zeros(Float, lanes) for _ in range(count))
@@ -177,50 +174,46 @@ def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, directio
     """
     Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
 
-    def add(total, begin, finish, cloud, inside):
+    def add(total, begin, finish, cloud):
         first, sums = total
-        rho = middle_density(clouds, origin, direction, begin, finish, cloud, inside)
-        kappas = [dr.gather(Float, sigma_t, cloud, inside) * rho for sigma_t in clouds.sigma_t]
-        first = dr.select(inside & ~dr.isfinite(first), begin, first)
-        near, far = (dr.select(inside, place - first, 0) for place in (begin, finish))
-        terms = [
-            dr.select(inside & (kappa > 0), (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0)
-            for kappa in kappas
-        ]
-        return (first, tuple(own + term for own, term in zip(sums, terms))), inside
+        rho = middle_density(clouds, origin, direction, begin, finish, cloud)
+        kappas = [dr.gather(Float, sigma_t, cloud) * rho for sigma_t in clouds.sigma_t]
+        first = dr.minimum(first, begin)
+        near, far = begin - first, finish - first
+        terms = [dr.select(kappa > 0, (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0) for kappa in kappas]
+        return (first, tuple(own + term for own, term in zip(sums, terms))), mi.Bool(True)
 
-    def step(total, x, cloud, inside):
-        return stride * voxel(clouds, cloud, inside)
+    def step(total, x, cloud):
+        return stride * voxel(clouds, cloud)
 
     nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
     _, sums = march(surfaces, origin, direction, end, nothing, step=step, add=add)
     return Color(*(sums * (3 // len(sums))))
 
 
-def reaching(rays: CloudRays, beams: Sequence[Beam], x, active) -> tuple[Any, Any]:
+def reaching(rays: CloudRays, beams: Sequence[Beam], x) -> tuple[Any, Any]:
     """Return by beam the depths of the legs to rays at a distance [m], and 1 where no surface is in the way."""
-    Float = type(x)
-    point = rays.origin + rays.direction * dr.select(dr.isfinite(x), x, 0)
-    legs = tuple(beam.leg(point, active) for beam in beams)
+    Float, point = type(x), rays.origin + rays.direction * x
+    legs = tuple(beam.leg(point, True) for beam in beams)
     return legs, tuple(
-        Float(1) if beam.lit is None else dr.select(beam.lit(point, active), Float(1), 0) for beam in beams
+        Float(1) if beam.lit is None else dr.select(beam.lit(point, True), Float(1), 0) for beam in beams
     )
 
 
 def with_step(
-    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, legs, lit, cloud, inside, *, printed: bool
+    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, legs, lit, cloud, long, *, printed: bool
 ) -> tuple[tuple[Any, ...], ...]:
-    """Return sums by beam and octave with the light of a step in a cloud of some number, in lanes `inside`.
+    """Return sums by beam and octave with the light of a step in a cloud of some number, where it has a length.
 
     `own`, `depths`: as of `step_light`; `legs`: at both ends, by beam and channel [1]; `lit`: by beam, what no surface
     hides [1].
     """
-    albedo = dr.gather(type(clouds.albedo), clouds.albedo, cloud, inside)
+    albedo = dr.gather(type(clouds.albedo), clouds.albedo, cloud)
     several = len(clouds.phases) > 1
-    phase = dr.gather(mi.UInt32, clouds.phase, cloud, inside) if several else None
+    phase = dr.gather(mi.UInt32, clouds.phase, cloud) if several else None
     return tuple(
         tuple(
-            total + dr.select(inside, term * (albedo * shown * (chosen_value(values, phase) if several else 1)), 0)
+            total + dr.select(long, term * (albedo * shown * (chosen_value(values, phase) if several else 1)), 0)
             for total, term, values in zip(
                 totals, step_light(beam, own, depths, (was, now), printed=printed), beam.phases, strict=True
             )
@@ -264,9 +257,8 @@ def _step(depth, eye, leg, *, printed: bool):
     if printed:
         return dr.exp(-last) - dr.exp(-first)
     change = dr.abs(depth + (leg[1] - leg[0]))
-    series = dr.fma(change, dr.fma(change, dr.fma(change, -1 / 24, 1 / 6), -0.5), 1)
-    share = dr.select(change < _SERIES, series, (1 - dr.exp(-change)) / dr.maximum(change, _SERIES))
-    return depth * dr.exp(-dr.minimum(first, last)) * share
+    _, less = exp_expm1_bounded(-change)
+    return depth * exp_bounded(-dr.minimum(first, last)) * dr.select(change > 0, -less / change, 1)
 
 
 def light_on_surfaces(rays: CloudRays, leg: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:

@@ -6,7 +6,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.bounds import cloud_surfaces, next_crossing, optical_depths
+from realtime.clouds.bounds import cloud_surfaces, next_crossing
+from realtime.clouds.march import depths_along
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import length_inside, loaded, ring
@@ -27,7 +28,8 @@ def depths_of(scene, origin, direction, end, precision="single"):
     Float = type(read.camera.origin.x)
     Vector = type(read.camera.origin)
     arrays = (Vector(*(aligned_array(Float, column) for column in values.T)) for values in (origin, direction))
-    depths = optical_depths(cloud_surfaces(read), read.medium.clouds, *arrays, dr.opaque(Float, end))
+    rays = cloud_surfaces(read), read.medium.clouds, *arrays, dr.opaque(Float, end)
+    depths = depths_along(*rays, stride=None, seen=False)
     return [np.array(depth, dtype=np.float64) for depth in depths]
 
 
@@ -53,7 +55,8 @@ def test_points_on_the_boundary_are_neither_lost_nor_counted_twice():
     place = o + d * first.distance
     inwards = mi.Vector3f(-first.normal)
     for way, sign in ((inwards, 1), (-inwards, 0)):
-        (depth,) = optical_depths(surfaces, read.medium.clouds, place, way, mi.Float(60.0), mi.Bool(met))
+        rays = surfaces, read.medium.clouds, place, way, mi.Float(60.0)
+        (depth,) = depths_along(*rays, stride=None, seen=False, active=mi.Bool(met))
         points, ways = (np.array(array, dtype=np.float64).T[met][:200] for array in (place, way))
         # A little further on there is no doubt about the start.
         expected = [

@@ -6,8 +6,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.bounds import cloud_surfaces, optical_depths
-from realtime.clouds.march import leg_through
+from realtime.clouds.bounds import cloud_surfaces
+from realtime.clouds.march import depths_along, leg_through
 from realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_as_printed, opacity_of
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
@@ -99,7 +99,7 @@ def test_order_one_with_64_steps(few):
 
 
 def opacity(surfaces, clouds, *rays):
-    return opacity_of(optical_depths(surfaces, clouds, *rays), type(clouds.albedo))
+    return opacity_of(depths_along(surfaces, clouds, *rays, stride=None, seen=False), type(clouds.albedo))
 
 
 @pytest.mark.claim("cloud-opacity", tolerance="0.1 %")
