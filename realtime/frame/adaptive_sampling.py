@@ -30,7 +30,7 @@ corners or at none.
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -38,9 +38,11 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.image_filters import channels
-from realtime.methods.interface.method import Layers
+from realtime.methods.interface.method import Layers, Method, View, camera_view
 from realtime.numerics.array_types import Metres, PerRay, PerTile, aligned_array
-from realtime.scene.camera import SIDE, TILE, Camera
+from realtime.numerics.recorded import Frozen, refusals
+from realtime.scene.camera import SIDE, TILE, Camera, tiled_pixels
+from realtime.scene.read_scene import Scene
 
 _DEPTHS = 1.1  # largest to least distance in a tile
 
@@ -95,6 +97,45 @@ def tile_corners(pixel, camera: Camera, *, by_rays: bool) -> Corners:
     )
     dr.eval(corners)
     return corners
+
+
+@dataclass(frozen=True)
+class BetweenCorners:
+    """A method that computes some rays of an image, and is the one that it wraps in all else."""
+
+    method: Method
+    corners: Corners
+    layers_of: Callable[..., Layers]  #: recorded where the method can be
+
+    by_rays, frozen = False, False  # how many rays are computed follows from those at the corners
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.method, name)
+
+    def render(self, view: View, state: Any, kernel: Any) -> Layers:
+        """Return the layers of every ray."""
+
+        def some(pixel, distance, last):
+            shown = view.scene, pixel, view.camera, view.medium, view.lights, state, distance, kernel
+            return self.layers_of(*shown, last, view.noise, view.extra_layers)
+
+        rays = view.pixel, view.distance
+        width, tolerance = view.camera.width, self.method.interpolated
+        return adaptive_layers(some, self.corners, *rays, width=width, tolerance=tolerance, last=view.carried)
+
+
+def between_corners(method: Method, scene: Scene) -> Method:
+    """Return a method that interpolates as its parameters say; raises InputError as `tile_corners` does."""
+    camera, features = scene.camera, scene.features
+
+    def layers_of(geometry, pixel, camera, medium, lights, state, distance, kernel, last, noise, extra_layers):
+        shown = {"features": features, "scene": geometry, "medium": medium, "lights": lights}
+        view = camera_view(camera, pixel, distance, **shown)
+        with refusals():
+            return method.render(replace(view, carried=last, noise=noise, extra_layers=extra_layers), state, kernel)
+
+    corners = tile_corners(tiled_pixels(camera.width, camera.height), camera, by_rays=method.by_rays)
+    return cast(Method, BetweenCorners(method, corners, Frozen(layers_of) if method.frozen else layers_of))
 
 
 def adaptive_layers(

@@ -31,7 +31,7 @@ import numpy as np
 
 from realtime.area_lights.points import LightSamples
 from realtime.errors import InputError
-from realtime.frame.adaptive_sampling import Corners, adaptive_layers, tile_corners
+from realtime.frame.adaptive_sampling import between_corners
 from realtime.frame.history import HistoryPass
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.sphere_lights import sampled_sphere, sphere_scales
@@ -39,7 +39,7 @@ from realtime.frame.surface import Cast, surface_stages
 from realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
 from realtime.numerics.array_types import PerRay, aligned_array
 from realtime.numerics.noise import Noise, blue_mask
-from realtime.numerics.recorded import Frozen, prepare_kernel, refusals, with_tables
+from realtime.numerics.recorded import Frozen, prepare_kernel, refusals
 from realtime.parameters import values
 from realtime.scene.camera import TILE, tiled_pixels
 from realtime.scene.light_samples import with_light_samples
@@ -87,8 +87,7 @@ class FrameRenderer:
     light_samples: LightSamples
     pixel: PerRay  #: pixel numbers in the order of the lanes
     structures: Mapping[Any, Stages]  #: by what lights have
-    tables: Any  #: what the kernel reads; None for most
-    corners: Corners | None  #: how the tiles of the image lie; None where every pixel is computed
+    kernel: Any  #: with the tables that it reads; None where the method uses none
     extra_layers: bool  #: whether frames have the further layers that the method names
     sphere_scales: Frozen | None  #: by what samples of sphere lights are scaled
     history: HistoryPass | None  #: takes the mean with the frames before
@@ -99,8 +98,7 @@ class FrameRenderer:
     @property
     def by_rays(self) -> bool:
         """Whether any part of the image can be rendered alone."""
-        alone = not self.method.carries and self.history is None
-        return self.method.by_rays and alone and self.corners is None
+        return self.method.by_rays and not self.method.carries and self.history is None
 
     @property
     def shades_apart(self) -> bool:
@@ -158,6 +156,8 @@ def frame_renderer(
     if chosen.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
     _check_clouds(scene, chosen)
+    if chosen.interpolated:
+        chosen = between_corners(chosen, scene)
     pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
     dr.eval(pixel)
     made = FrameRenderer(
@@ -166,24 +166,21 @@ def frame_renderer(
         light_samples,
         pixel,
         structures={},
-        tables=prepare_kernel(kernel, type(scene.camera.origin.x)) if chosen.uses_kernel else None,
-        corners=None,
+        kernel=prepare_kernel(kernel, type(scene.camera.origin.x)) if chosen.uses_kernel else None,
         extra_layers=extra_layers and not scene.area_lights,
-        sphere_scales=sphere_scales(scene, chosen, kernel) if "sphere" in scene.features.area_lights else None,
+        sphere_scales=sphere_scales(scene, chosen) if "sphere" in scene.features.area_lights else None,
         history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x)) if chosen.history else None,
         mask=blue_mask() if chosen.noisy else None,
     )
     groups = _lights_by_group(made)
-    if chosen.interpolated:
-        made = replace(made, corners=tile_corners(pixel, scene.camera, by_rays=chosen.by_rays))
     structures: dict[Any, Stages] = {}
     if made.shades_apart:
         for lights in _few_lights(made):
-            structures[_structure(lights)] = _stages(made, replace(scene, lights=lights), kernel, alone=False)
+            structures[_structure(lights)] = _stages(made, replace(scene, lights=lights), alone=False)
     for lights in groups:
         key = _structure(lights)
         if key not in structures:
-            structures[key] = _stages(made, replace(scene, lights=lights), kernel, alone=len(groups) == 1)
+            structures[key] = _stages(made, replace(scene, lights=lights), alone=len(groups) == 1)
     return replace(made, structures=structures)
 
 
@@ -275,11 +272,10 @@ def light_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
     )
 
 
-def _stages(renderer: FrameRenderer, scene: Scene, kernel: Any, *, alone: bool) -> Stages:
+def _stages(renderer: FrameRenderer, scene: Scene, *, alone: bool) -> Stages:
     """Return the functions for the lights of a scene; `alone` if these are all lights of the frame."""
-    method, features = renderer.method, scene.features
+    method, features, extra_layers = renderer.method, scene.features, renderer.extra_layers
     method.check(scene)
-    interpolates, extra_layers = renderer.corners is not None, renderer.extra_layers
     surface, shade, shade_casts_rays = surface_stages(
         scene,
         provides_visibility=method.provides_visibility,
@@ -287,16 +283,15 @@ def _stages(renderer: FrameRenderer, scene: Scene, kernel: Any, *, alone: bool) 
         through_media=not method.renders_clouds,
     )
 
-    def run(geometry, pixel, camera, medium, lights, state, distance, by_light, tables, last=None, noise=None):
+    def run(geometry, pixel, camera, medium, lights, state, distance, by_light, kernel, last=None, noise=None):
         shown = {"features": features, "scene": geometry, "medium": medium, "lights": lights}
         view = camera_view(camera, pixel, distance, **shown)
         view = replace(view, carried=last, noise=noise, extra_layers=extra_layers)
-        if method.provides_visibility and not interpolates:
+        if method.provides_visibility:
             view = replace(view, surfaces=by_light)
         with refusals():
-            layers = method.render(view, state, with_tables(kernel, tables))
-        layers = layers if extra_layers else replace(layers, extra=None)
-        return layers if interpolates else _composed(layers, by_light, alone=alone)
+            layers = method.render(view, state, kernel)
+        return _composed(layers if extra_layers else replace(layers, extra=None), by_light, alone=alone)
 
     frozen = method.frozen and (renderer.by_rays or scene.camera.width * scene.camera.height <= _LARGE)
     render = Frozen(run) if frozen else run
@@ -470,7 +465,7 @@ def _sphere_scales(renderer: FrameRenderer, groups: tuple[LightGroup, ...], cast
         if light.kind == "sphere":
             sphere = sampled_sphere(light, renderer.light_samples, type(scene.camera.origin.x))
             like = next(group.lights[0] for group in groups if group.scene.lights[0].source == number)
-            shown = scene.camera, renderer.pixel, scene.medium, like, sphere, cast.distance, renderer.tables
+            shown = scene.camera, renderer.pixel, scene.medium, like, sphere, cast.distance, renderer.kernel
             scales[number] = renderer.sphere_scales(*shown)
             dr.eval(scales[number])
     return scales
@@ -482,27 +477,9 @@ def _run_group(
     """Run the method for one group of lights; return what is seen behind all media, of no light, too."""
     scene, method = renderer.scene, renderer.method
     geometry = scene.geometry if method.casts_rays else None
-
-    def render(pixel, distance, last):
-        shown = geometry, pixel, scene.camera, scene.medium, group.lights, state, distance, by_light, renderer.tables
-        if method.noisy:
-            return group.stages.render(*shown, last, noise)
-        return group.stages.render(*shown, last) if method.carries else group.stages.render(*shown)
-
-    if renderer.corners is None:
-        found = render(renderer.pixel, cast.distance, last)
-    else:
-        layers = adaptive_layers(
-            render,
-            renderer.corners,
-            renderer.pixel,
-            cast.distance,
-            width=scene.camera.width,
-            tolerance=method.interpolated,
-            last=last,
-        )
-        found = _composed(layers, by_light, alone=False)
-    airlight, surface, beyond, extra, carried = found
+    shown = geometry, renderer.pixel, scene.camera, scene.medium, group.lights, state, cast.distance, by_light
+    more = (last, noise) if method.noisy else (last,) if method.carries else ()
+    airlight, surface, beyond, extra, carried = group.stages.render(*shown, renderer.kernel, *more)
     return Rendered(airlight, _sum(by_light) if surface is None else surface, extra, carried), beyond
 
 

@@ -29,7 +29,7 @@ from realtime.area_lights.shape import AreaLight
 from realtime.methods.interface.method import Method, View, camera_view
 from realtime.numerics.array_types import aligned_array, types_of
 from realtime.numerics.functions import summed
-from realtime.numerics.recorded import Frozen, with_tables
+from realtime.numerics.recorded import Frozen
 from realtime.scene.lights import Facing
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.read_scene import Scene
@@ -47,7 +47,7 @@ class SampledSphere:
     normals: Any  #: of the samples, one a lane
 
 
-def sphere_scales(scene: Scene, method: Method, kernel: Any) -> Frozen | None:
+def sphere_scales(scene: Scene, method: Method) -> Frozen | None:
     """Return what finds by what a sphere light's samples are scaled; None where the method or the medium has no use.
 
     Valid for methods that render samples one by one with a kernel in a homogeneous medium without bounds.
@@ -56,15 +56,14 @@ def sphere_scales(scene: Scene, method: Method, kernel: Any) -> Frozen | None:
         return None
     features = scene.features
 
-    def scale(camera, pixel, medium, light, sphere, distance, tables):
+    def scale(camera, pixel, medium, light, sphere, distance, kernel):
         view = camera_view(camera, pixel, distance, features=features, scene=None, medium=medium, lights=(light,))
-        own = with_tables(kernel, tables)
         Float = type(distance)
 
         def integral(normal, exact_normal):
             facing = Facing(exact_normal, light.facing.lift, light.facing.chord)
             sample = replace(light, position=dr.fma(normal, sphere.radius, sphere.centre), facing=facing)
-            return view.lit_by(sample, own).gamma(distance)
+            return view.lit_by(sample, kernel).gamma(distance)
 
         def of_sample(number):
             normal = dr.gather(type(sphere.normals), sphere.normals, number)
@@ -76,7 +75,7 @@ def sphere_scales(scene: Scene, method: Method, kernel: Any) -> Frozen | None:
             normal, weight = suited(number)
             return integral(normal, mi.Vector3d(normal)) * weight
 
-        nothing = view.lit_by(light, own).nothing(dr.width(distance))
+        nothing = view.lit_by(light, kernel).nothing(dr.width(distance))
         every = summed(sphere.count, of_sample, nothing)
         whole = summed(_AZIMUTHS * _ANGLES, of_place, nothing)
         return dr.select(every > 0, whole * Float(sphere.count) / every, 1)

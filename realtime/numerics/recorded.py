@@ -10,13 +10,14 @@ Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
 
 **Tables of kernels.** A frozen function cannot take an array from the host, and reads one on the device only if it is
 among its inputs. A kernel may therefore have a `prepare`, ``prepare(Float, **parameters) -> tables``, which
-`prepared_by` gives it. Who freezes a function calls `prepare_kernel` before, passes what it returns as an input, and
-calls the kernel as `with_tables` makes it. A kernel without `prepare` knows nothing of this.
+`prepared_by` gives it. Who freezes a function passes it the kernel that `prepare_kernel` returns as an input. A kernel
+without `prepare` knows nothing of this.
 """
 
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -97,17 +98,24 @@ def prepared_by(prepare: Callable[..., Any]) -> Callable[[Any], Any]:
     return mark
 
 
+@dataclass(frozen=True)
+class PreparedKernel:
+    """A kernel and the tables that it reads, an input of recorded functions."""
+
+    kernel: Any
+    tables: Any
+
+    def __call__(self, *arguments):
+        """Call the kernel."""
+        return self.kernel(*arguments, tables=self.tables)
+
+
 def prepare_kernel(kernel: Any, Float: type) -> Any:
-    """Return the tables of a kernel, evaluated, in the precision of `Float`; None for one that reads none.
+    """Return a kernel with its tables, evaluated, in the precision of `Float`; the kernel itself if it reads none.
 
     `kernel`: a kernel function, or a `functools.partial` of one that sets parameters; `Float`: the type of a number per
     ray. Raises InputError for what the kernel's `prepare` refuses.
     """
     function, parameters = (kernel.func, kernel.keywords) if isinstance(kernel, partial) else (kernel, {})
     prepare = getattr(function, "prepare", None)
-    return None if prepare is None else prepare(Float, **parameters)
-
-
-def with_tables(kernel: Any, tables: Any) -> Any:
-    """Return the kernel that reads these tables, from `prepare_kernel`."""
-    return kernel if tables is None else partial(kernel, tables=tables)
+    return kernel if prepare is None else PreparedKernel(kernel, prepare(Float, **parameters))

@@ -19,7 +19,7 @@ from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import aligned_array
-from realtime.numerics.recorded import Frozen, prepare_kernel, with_tables
+from realtime.numerics.recorded import Frozen, prepare_kernel
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
@@ -148,17 +148,13 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     foot, height, x0, x1 = (aligned_array(mi.Float, column[part]) for column in columns)
     geometry = RayGeometry(foot, height, None, None)
     dr.eval(geometry.foot, geometry.height, x0, x1)
-    tables = prepare_kernel(function, mi.Float)
+    kernel = prepare_kernel(function, mi.Float)
     # Once outside: what a kernel refuses must not be raised while it is recorded.
-    dr.eval(with_tables(function, tables)(geometry, x0, x1, medium, light))
-
-    def evaluate(geometry, x0, x1, medium, light, tables):
-        return with_tables(function, tables)(geometry, x0, x1, medium, light)
-
-    replay = Frozen(evaluate)
+    dr.eval(kernel(geometry, x0, x1, medium, light))
+    replay = Frozen(lambda kernel, *case: kernel(*case))
 
     def work():
-        J = replay(geometry, x0, x1, medium, light, tables)
+        J = replay(kernel, geometry, x0, x1, medium, light)
         dr.eval(J)
         return J
 

@@ -24,7 +24,6 @@ from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_f
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
 from realtime.methods.shader.source import is_shader
-from realtime.numerics.recorded import Frozen
 from realtime.scene.read_scene import Scene, read_scene
 from reference.storage.exr import Image
 from validation.clock import largest_memory, peak_memory, stopwatch, time_repeated, timed
@@ -169,7 +168,7 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     if timed_scene is not None and first > 1e3 * _LONG:
         timed_scene = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
-    if chosen.own and not is_shader(chosen.method) and not isinstance(renderer.stages.render, Frozen):
+    if chosen.own and not is_shader(chosen.method) and not find_method(chosen.method).frozen:
         notes.append("not frozen: its Python runs again for every frame")
     shown = renderer if timed_scene is None else prepared(timed_scene, chosen)
     took: list[float] = []
