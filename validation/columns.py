@@ -53,6 +53,12 @@ def values_of(record: Any) -> dict[str, Any]:
     return flat({each.name: getattr(record, each.name) for each in fields(record)})
 
 
+def shown_values(record: Any) -> dict[str, Any]:
+    """Return the values that have a column, by key, as JSON holds them; arrays are left out."""
+    values = values_of(record)
+    return {each.key: plain(values.get(each.key)) for each in columns_of(record.__class__)}
+
+
 def flat(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return mappings and records within a mapping as one dictionary, keys joined by dots."""
     values: dict[str, Any] = {}

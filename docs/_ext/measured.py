@@ -133,14 +133,14 @@ def kernel_costs(phase: str) -> str:
 
 def left_out() -> str:
     """Return for every scene the fraction of light that single scattering leaves out."""
-    shares = left_out_table(kept_scenes(), code=True)
+    fractions = left_out_table(kept_scenes(), code=True)
     keys = ("scene", "medium", "medium_interval", "everything", "everything_interval")
-    return markdown(replace(shares.only(*keys), title=""))
+    return markdown(replace(fractions.only(*keys), title=""))
 
 
-def _share(share: Fraction) -> str:
-    low, high = (100 * end for end in share.interval)
-    return f"{100 * share.value:.1f} % ({low:.1f}..{high:.1f})"
+def _percent(found: Fraction) -> str:
+    low, high = (100 * end for end in found.interval)
+    return f"{100 * found.value:.1f} % ({low:.1f}..{high:.1f})"
 
 
 def scenes() -> str:
@@ -162,7 +162,7 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
         if reference.relative_bound is not None:
             bound = number(reference.relative_bound, 2)
             words.append(f"- Reference: mean airlight {number(reference.mean)} W/(m^2 sr), relative bound {bound}.")
-        words.append(f"- Single scattering leaves out {_share(kept.multiple.medium)} of the airlight.")
+        words.append(f"- Single scattering leaves out {_percent(kept.multiple.medium)} of the airlight.")
     return "\n".join([*words, ""])
 
 

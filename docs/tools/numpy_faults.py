@@ -255,8 +255,8 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("phase", "an isotropic phase function", {"phase": lambda c: np.ones_like(c)}),
     ("phase", "Schlick's phase function, k = g", {"phase": lambda c: (1 - 0.35**2) / (1 - 0.35 * c) ** 2}),
     ("phase", "Rayleigh's phase function", {"phase": lambda c: 0.75 * (1 + c * c)}),
-    ("light-leg", "the way from the light not attenuated", {"legs": (1.0, 0.0)}),
-    ("camera-leg", "the way to the camera not attenuated", {"legs": (0.0, 1.0)}),
+    ("light-path", "the way from the light not attenuated", {"legs": (1.0, 0.0)}),
+    ("camera-path", "the way to the camera not attenuated", {"legs": (0.0, 1.0)}),
     ("near-plane", "no fog before 0.5 m", {"start": 0.5}),
     ("fog-end", "no fog beyond 6 m", {"end": 6.0}),
     ("depth-axis", "depth along the axis", {"planar": True}),
@@ -286,7 +286,7 @@ FAULTS_OF_LAYERS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("scale-height", "density halves in the scale height", {"layer": (0.2, 1.3 / math.log(2))}),
     ("scale-height", "the scale height 1.8 times", {"layer": (0.2, 1.8 * 1.3)}),
     ("height-fog", "the scale height 0.7 times, and the base 0.6 m too high", {"layer": (0.8, 0.7 * 1.3)}),
-    ("camera-leg", "the way to the camera not attenuated, in height fog", {"legs": (0.0, 1.0)}),
+    ("camera-path", "the way to the camera not attenuated, in height fog", {"legs": (0.0, 1.0)}),
 )
 CASES = (*((RIGHT, *fault) for fault in FAULTS), *((LAYERED, *fault) for fault in FAULTS_OF_LAYERS))
 

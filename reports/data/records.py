@@ -94,7 +94,7 @@ class Reference:
     missed: Number = column(meaning="fraction of the first shadow rays that disagreed")
     checked: int = column(meaning="shadow rays that checked the lit intervals")
     disagreements: int = column(meaning="of these")
-    refined: int = column(meaning="disagreements that were mended")
+    refined: int = column(meaning="disagreements that were resolved")
     left: int = column(meaning="disagreements that were not: the bound has them")
 
 

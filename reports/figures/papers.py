@@ -134,27 +134,21 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
     """Return Fig. 8 of Bouthors 2008: the light that leaves a point of a slab by its direction, in three ways."""
     from validation.papers.slab import transport_curves
 
-    rows = [
-        {key: curve[key] for key in ("thickness", "depth", "orders")} | dict(zip(("angle", *_WAYS), numbers))
-        for curve in transport_curves()
-        for numbers in zip(curve["angle"], *(curve[way] for way in _WAYS), strict=True)
-    ]
+    curves = transport_curves()
 
     def draw(column: str) -> Any:
-        places = list(dict.fromkeys((row["thickness"], row["depth"]) for row in rows))
+        places = list(dict.fromkeys((curve.thickness, curve.depth) for curve in curves))
         width, across = WIDTHS[column], 2 if column == "double" else 1
         down = -(-len(places) // across)
         figure = new_figure(width, 0.6 * down * width / across)
         panels = figure.subplots(down, across, sharex=True, squeeze=False).ravel()
         for panel, place in zip(panels, places):
             for at, orders in enumerate(_ORDERS):
-                own = [row for row in rows if (row["thickness"], row["depth"], row["orders"]) == (*place, orders)]
-                lit = np.array([row["exact"] or 0.0 for row in own]) > 0
+                (curve,) = (c for c in curves if (c.thickness, c.depth, c.orders) == (*place, orders))
                 for way, (style, colour, label) in _WAYS.items():
-                    values = np.array([row[way] or 0.0 for row in own], dtype=float)
-                    curve = np.where(lit & (values > 0), values, np.nan)
-                    label = "" if at else label
-                    panel.plot([row["angle"] for row in own], curve, style, color=COLOURS[colour], label=label or None)
+                    values = getattr(curve, way)
+                    shown = np.where((curve.exact > 0) & (values > 0), values, np.nan)
+                    panel.plot(curve.angle, shown, style, color=COLOURS[colour], label=None if at else label)
             title = f"{place[0]:g} m thick, {place[1]:g} m deep, orders {', '.join(_ORDERS)}"
             panel.set_title(title, fontsize=6)
             panel.set(yscale="log", xlabel="zenith angle of the view [degrees]", ylabel="T [1/sr]")
@@ -163,6 +157,12 @@ def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
             panel.set_axis_off()
         return figure
 
+    names = ("thickness", "depth", "orders", "angle", *_WAYS)
+    rows = [
+        dict(zip(names, (curve.thickness, curve.depth, curve.orders, *numbers)))
+        for curve in curves
+        for numbers in zip(curve.angle.tolist(), *(getattr(curve, way).tolist() for way in _WAYS), strict=True)
+    ]
     return PaperFigure(draw, rows=rows)
 
 

@@ -83,7 +83,7 @@ def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
 
 
 def _light(light: dict[str, Any]) -> dict[str, Any]:
-    """Return a light; its power is that of a lamp that shines as on its axis in all directions."""
+    """Return a light; its power is that of a point light as bright in all directions as on its axis."""
     if light["kind"] == "area":
         return {"cannot": "area lights were not tried in Cycles"}
     if light["kind"] == "spot" and light["beam_angle"] < light["cutoff_angle"]:

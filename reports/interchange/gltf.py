@@ -64,13 +64,13 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     scene = read_reference(loaded.scene)
     turn = np.array(_TURNS[described["up"]], dtype=np.float64)
     opaque = [shape_mesh(shape) for shape in scene.occluders.shapes() if not shape.is_emitter()]
-    lamps = [shape_mesh(light.shape) for light in scene.area]
+    area_lights = [shape_mesh(light.shape) for light in scene.area]
     names = {medium.name for medium in scene.media}
     bounds = [shape_mesh(shape) for shape in loaded.scene.shapes() if shape.id() in names]
-    document, binary = _document(described, turn, [*opaque, *bounds, *lamps])
+    document, binary = _document(described, turn, [*opaque, *bounds, *area_lights])
     data = _container(document, binary)
     write_bytes(path, data)
-    meshes = [*opaque, *bounds, *lamps]
+    meshes = [*opaque, *bounds, *area_lights]
     return {
         "path": str(path),
         "triangles": sum(len(mesh.faces) for mesh in meshes),

@@ -39,9 +39,9 @@ EFFICACY = 683.0  #: of monochromatic light of 540 THz, which defines the lumen 
 CONVENTION = (
     "Linear RGB radiance in W/(m^2 sr), as the light's intensity in W/sr gives it: no exposure, no tone mapping, no "
     "gamma, no bloom. Single scattering: light - one scattering in the medium or one diffuse reflection - eye, "
-    "attenuated by exp(-sigma_t length) on both legs; no ambient light, no sky. The airlight alone is the layer "
-    "`airlight`; the plain channels are airlight + surface. One ray through the centre of every pixel, or the mean "
-    "over the pixel's area (a box filter): `compare` finds out which."
+    "attenuated by exp(-sigma_t length) along both segments of the path; no ambient light, no sky. The airlight alone "
+    "is the layer `airlight`; the plain channels are airlight + surface. One ray through the centre of every pixel, or "
+    "the mean over the pixel's area (a box filter): `compare` finds out which."
 )
 
 
@@ -279,8 +279,8 @@ def luminous_flux(power: Array) -> float:
     """Return the luminous flux [lm] of radiant power in three channels [W].
 
     The channels are taken for linear RGB with the primaries and the white of sRGB: 683 lm/W times the luminance of the
-    triple, as colour-science has it. That is how Radiance and many engines count; the spectrum of a real lamp of this
-    power and colour has another, lower flux.
+    triple, as colour-science has it. That is how Radiance and many engines count; a real spectrum of this power and
+    colour has another, lower flux.
     """
     from colour.models import RGB_COLOURSPACE_sRGB
 

@@ -29,21 +29,21 @@ def progress_bar(title: str) -> Iterator[Progress]:
 def part_of(progress: Progress | None, first: float, last: float, *, before: str = "") -> Progress:
     """Return the callback for a part of some work, from fraction `first` to `last`; `before` precedes its words."""
     if progress is None:
-        return lambda share, what: None
-    # This form, unlike first + share (last - first), gives both ends exactly.
-    return lambda share, what: progress((1 - share) * first + share * last, before + what)
+        return lambda fraction, what: None
+    # This form, unlike first + fraction (last - first), gives both ends exactly.
+    return lambda fraction, what: progress((1 - fraction) * first + fraction * last, before + what)
 
 
 def counted(progress: Progress | None) -> Steps:
-    """Return the callback (done, total, what) for work that counts its steps; `progress` is called with shares."""
+    """Return the callback (done, total, what) for work that counts its steps; `progress` is called with fractions."""
     if progress is None:
         return lambda done, total, what: None
     return lambda done, total, what: progress(done / total, what)
 
 
-def seconds_left(elapsed: float, share: float) -> float | None:
+def seconds_left(elapsed: float, fraction: float) -> float | None:
     """Return how long the rest takes if it goes on like this [s]; None at the beginning."""
-    return elapsed * (1 - share) / share if share > 0 else None
+    return elapsed * (1 - fraction) / fraction if fraction > 0 else None
 
 
 def _rich_bar(title: str) -> Iterator[Progress]:
@@ -66,7 +66,7 @@ def _rich_bar(title: str) -> Iterator[Progress]:
     task = bar.add_task(title, total=1.0, what="", left="")
     shown = False
 
-    def progress(share: float, what: str) -> None:
+    def progress(fraction: float, what: str) -> None:
         nonlocal shown
         elapsed = time.monotonic() - start
         if not shown and elapsed > _PATIENCE:
@@ -74,8 +74,8 @@ def _rich_bar(title: str) -> Iterator[Progress]:
             bar.start()
             console.show_cursor(True)  # Rich hides it, and Ctrl-C ends the process before it would show it again
         # Rich's own column considers the last half minute alone, so that one long part makes the estimate jump.
-        left = seconds_left(elapsed, share)
-        bar.update(task, completed=share, what=what, left="" if left is None else f"about {_clock(left)} left")
+        left = seconds_left(elapsed, fraction)
+        bar.update(task, completed=fraction, what=what, left="" if left is None else f"about {_clock(left)} left")
 
     try:
         yield progress
@@ -92,13 +92,13 @@ def _clock(seconds: float) -> str:
 def _plain_lines(title: str) -> Progress:
     start = last = time.monotonic()
 
-    def progress(share: float, what: str) -> None:
+    def progress(fraction: float, what: str) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - start < _PATIENCE or now - last < _PLAIN_EVERY or not 0 < share < 1:
+        if now - start < _PATIENCE or now - last < _PLAIN_EVERY or not 0 < fraction < 1:
             return
         last = now
-        left = seconds_left(now - start, share)
-        print(f"{title}: {100 * share:.0f} %, about {left:.0f} s left, {what}", file=sys.stderr, flush=True)
+        left = seconds_left(now - start, fraction)
+        print(f"{title}: {100 * fraction:.0f} %, about {left:.0f} s left, {what}", file=sys.stderr, flush=True)
 
     return progress

@@ -3,7 +3,7 @@
 
 What is compared is linear up to white (`tone_mapped`): twice the radiance looks twice as bright, what is brighter than
 white is cut off. What is only looked at, previews and the gallery, goes through the curve of `preview`, which keeps the
-colours of lamps and shows the dark of a room.
+colours of lights and shows the dark of a room.
 """
 
 import io

@@ -128,8 +128,8 @@ def _place(scene: str, entry: Agreement) -> str:
 
 
 def _left_out(scenes: Scenes) -> Claim:
-    shares = "; ".join(f"{scene.name} {100 * scene.multiple.medium.value:.2g} %" for scene in scenes)
-    text = f"Every method here scatters once. The fraction of the airlight that this leaves out: {shares}."
+    fractions = "; ".join(f"{scene.name} {100 * scene.multiple.medium.value:.2g} %" for scene in scenes)
+    text = f"Every method here scatters once. The fraction of the airlight that this leaves out: {fractions}."
     return _claim("left-out", text)
 
 

@@ -29,7 +29,7 @@ from reports.machine.own_process import EndedError, in_own_process
 from reports.machine.progress import Progress, part_of
 from reports.page.render import render_page
 from reports.report.claims import claims, growth_claims, own_fault, unstudied
-from reports.report.others import other_parts, paper_rows, shares
+from reports.report.others import other_parts, paper_rows, spans_of
 from reports.report.scene import folder_of, write_scene
 from validation.columns import record_of
 from validation.kernels.records import Stability
@@ -96,7 +96,7 @@ def write_report(
         others = other_parts(study)
         of_scenes = [each.seconds() for each in studies]
         whole = [sum(each.values()) for each in of_scenes] + [part.seconds for part in others]
-        spans = list(shares({str(n): each for n, each in enumerate([*whole, _PAGE_SECONDS * len(studies)])}).values())
+        spans = list(spans_of({str(n): each for n, each in enumerate([*whole, _PAGE_SECONDS * len(studies)])}).values())
         studied, results = [], list[Result]()
         with _timed(seconds, "scenes"):
             if cluster is not None:
@@ -106,7 +106,7 @@ def write_report(
             ended = _try_own(studies[0], process) if studies else {}
             for each, parts, span in zip(studies, of_scenes, spans):
                 step = part_of(progress, *span, before=f"{each.name}: ")
-                begins = {part: first for part, (first, _) in shares(parts).items()}
+                begins = {part: first for part, (first, _) in spans_of(parts).items()}
                 result = study_scene(
                     each,
                     images=shown.get(scene_stem(each.path), ()),

@@ -56,8 +56,8 @@ def other_parts(study: Study) -> list[OtherPart]:
     return parts
 
 
-def shares(seconds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return where each part begins and ends, as shares of the time that all of them take in turn."""
+def spans_of(seconds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Return where each part begins and ends, as fractions of the time that all of them take in turn."""
     spent = [max(_LEAST, value) for value in seconds.values()]
     total = sum(spent)
     bounds = [sum(spent[:number]) / total for number in range(len(spent))] + [1.0]
@@ -144,7 +144,7 @@ def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -
 def measure_claims(chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None) -> list[Judged]:
     """Measure what claims need and is not cached, and return those that are decided; `quick` leaves out images."""
     parts = {name: _paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])}
-    steps = shares({name: part.seconds for name, part in parts.items()})
+    steps = spans_of({name: part.seconds for name, part in parts.items()})
     figures = {
         name: part.result(part_of(progress, *steps[name], before=f"{name}, ")).data["figures"]
         for name, part in parts.items()

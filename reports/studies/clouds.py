@@ -179,14 +179,14 @@ def _draw_slab(record: Mapping[str, Any], column: str) -> Any:
             errors = 2 * np.nan_to_num(values(walked["standard_error"]["orders"], name))
             panel.errorbar(at, values(walked["orders"], name), errors, capsize=2, label=label, **dots)
 
-    for number, (share, side, colour) in enumerate(_SIDES):
+    for number, (name, side, colour) in enumerate(_SIDES):
         at = places + 0.4 * number - 0.2
-        fractions.bar(at, values(rows, share), 0.38, color=COLOURS[colour], label=side)
-        put(fractions, share, at, "photons, ±2 standard errors" if number else None)
+        fractions.bar(at, values(rows, name), 0.38, color=COLOURS[colour], label=side)
+        put(fractions, name, at, "photons, ±2 standard errors" if number else None)
         for kind, style in (("mean", "--"), ("rms", "-")):
-            name = f"{side}_{kind}"
-            lengths.plot(places, values(rows, name), style, color=COLOURS[colour], label=f"{side}, {kind}")
-            put(lengths, name, places)
+            key = f"{side}_{kind}"
+            lengths.plot(places, values(rows, key), style, color=COLOURS[colour], label=f"{side}, {kind}")
+            put(lengths, key, places)
     for panel in (fractions, lengths):
         panel.set_xticks(places, [row["orders"] for row in rows], rotation=45)
         panel.set_xlabel("order of scattering")

@@ -227,7 +227,6 @@ def integrals(
     kernel: KernelLike = "exact",
     *,
     precision: Literal["single", "double"] = "single",
-    phase: str | None = None,
     certify: bool = False,
 ) -> Integrals:
     """Integrate the airlight of each row of a CSV file by a kernel.
@@ -237,17 +236,14 @@ def integrals(
     Parameters
     ----------
     cases
-        A CSV file with the columns of airlight_integral.csv; x1 may be inf. From Python also columns by name, of any
-        shapes that broadcast together: `phase` ('isotropic', 'rayleigh', 'hg' ..), `g` for 'hg', `x0`, `x1` [m],
-        `sigma_t` [1/m], and either `foot` and `height` [m] or `origin`, `direction` and `light`, (..., 3); or a data
-        frame with such columns.
+        A CSV file with the columns of airlight_integral.csv; x1 may be inf, phase isotropic, rayleigh, hazy, murky, hg,
+        hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH or mie-modified:.. . From Python also columns by name, of any
+        shapes that broadcast together: `phase`, `g` for hg, `x0`, `x1` [m], `sigma_t` [1/m], and either `foot` and
+        `height` [m] or `origin`, `direction` and `light`, (..., 3); or a data frame with such columns.
     kernel
         Airlight kernel, see `airlight list kernels`.
     precision
         Whether the kernel computes in float32 (single) or float64 (double).
-    phase
-        Phase function of all rows, in place of the file's: hg:G, hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH,
-        mie-modified, ...
     certify
         Also integrate by adaptive quadrature in float64, to 1e-10, and compare with that where no value is given.
 
@@ -264,7 +260,7 @@ def integrals(
     from reports.machine.environment import activate
     from validation.kernels.case_files import integrate_cases as certified
 
-    read, shape = _cases(cases, phase)
+    read, shape = _cases(cases)
     activate()
     from validation.kernels.cases import check_results, integrate_cases, summary
 
@@ -285,13 +281,11 @@ def integrals(
     )
 
 
-def _cases(cases: Any, phase: str | None) -> "tuple[Cases, tuple[int, ...]]":
+def _cases(cases: Any) -> "tuple[Cases, tuple[int, ...]]":
     from validation.kernels.case_files import Cases, cases_from_columns, read_cases
 
     if isinstance(cases, str | os.PathLike):
-        cases = read_cases(Path(cases), phase=phase)
-    elif phase is not None:
-        raise InputError("phase: is for a file; give columns with the phase function that they have")
+        cases = read_cases(Path(cases))
     if isinstance(cases, Cases):
         return cases, (len(cases.x0),)
     if not isinstance(cases, Mapping) and not hasattr(cases, "keys"):

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Studies of methods: times and errors, and errors by cause."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, fields
 from functools import cache, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from reports.api.inputs import (
@@ -22,7 +21,12 @@ from reports.api.inputs import (
 )
 from reports.machine.progress import part_of
 from reports.studies.result import FRACTION, Study, with_environment
-from reports.tables.table import Row, Table, Value, numbers, table, words
+from reports.tables.table import Row, Table, table, table_of, words
+from validation.columns import shown_values
+
+if TYPE_CHECKING:
+    from validation.study.causes import ErrorPart
+    from validation.study.configuration import Configuration
 
 
 def loaded_scenes(scenes: Any, size: Any) -> list[Any]:
@@ -205,11 +209,7 @@ def _flat(row: Any, chosen: Any) -> dict[str, Any]:
 
 # Errors by cause
 
-_BY_CAUSE = (
-    *words(label="method", cause="error by", without="gone with"),
-    *numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", how=FRACTION),
-    *numbers(share="fraction of the whole", how={"percent": True, "places": 1}),
-)
+_PARTS = {"relative_rmse": FRACTION, "relative_bias": FRACTION, "fraction": {"percent": True, "places": 1}}
 
 
 @one_error
@@ -251,17 +251,21 @@ def decomposition(
     check_study("decomposition", loaded, chosen, progress=progress)
     data, tables, rows, drawn = [], [], [], []
     for scene, tell in scene_by_scene(loaded, "decomposition", progress):
-        entries, split = _split(scene, chosen, usual.measure, apart=apart, progress=tell)
-        data.append({"name": scene.name, "size": list(scene.size), "methods": entries})
+        split = _split(scene, chosen, usual.measure, apart=apart, progress=tell)
         title = "{}, {} x {}: error of the airlight by cause".format(scene.name, *scene.size)
-        tables.append(_cause_table(title, entries))
-        rows += [
-            {"scene": scene.name, "label": entry["label"], **part}
-            for entry in entries
-            if not entry["refused"]
-            for part in (entry["whole"], *entry["parts"])
-        ]
-        drawn.append(split)
+        tables.append(_cause_table(title, split))
+        entries = []
+        for each, _, found in split:
+            entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
+            entry |= {"parameters": dict(each.parameters)}
+            if isinstance(found, str):
+                entries.append(entry | {"refused": found})
+                continue
+            parts = [shown_values(part) for part in found]
+            entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
+            rows += [{"scene": scene.name, "label": each.label, **part} for part in parts]
+        data.append({"name": scene.name, "size": list(scene.size), "methods": entries})
+        drawn.append([(each.label, image, found) for each, image, found in split if not isinstance(found, str)])
     return Study(
         name="decomposition",
         data=with_environment(scenes=data),
@@ -271,11 +275,12 @@ def decomposition(
     )
 
 
-def _split(
-    loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progress: Any
-) -> tuple[list[dict[str, Any]], Any]:
-    """Return the errors of a scene by cause, JSON-ready and with their images."""
-    from validation.columns import plain
+#: Configurations with the reference, and their parts or the reason for which there are none.
+Split = list[tuple["Configuration", Any, "list[ErrorPart] | str"]]
+
+
+def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progress: Any) -> Split:
+    """Return the errors of a scene by cause."""
     from validation.study.causes import decompose
     from validation.study.scene import configurations_for
 
@@ -288,33 +293,28 @@ def _split(
             raise InputError(row.reason or f"{configuration.label}: its image has values that are not finite")
         return frame.airlight
 
-    entries, split = [], []
+    split: Split = []
     useful = configurations_for(scene.features, chosen)
     for at, each in enumerate(useful):
         progress((1 + at) / (1 + len(useful)), each.label)
-        entry: dict[str, Any] = {"label": each.label, "method": each.method, "kernel": each.kernel}
-        entry |= {"parameters": dict(each.parameters)}
         try:
-            found = decompose(scene, each, reference.airlight, airlight)
+            split.append((each, reference.airlight, decompose(scene, each, reference.airlight, airlight)))
         except InputError as error:
-            entries.append(entry | {"refused": str(error)})
-            continue
-        split.append((each.label, reference.airlight, found))
-        parts = [plain(numbers) for numbers, _ in found]
-        entries.append(entry | {"refused": None, "whole": parts[0], "parts": parts[1:]})
-    return entries, split
+            split.append((each, reference.airlight, str(error)))
+    return split
 
 
-def _cause_table(title: str, methods: list[dict[str, Any]]) -> Table:
+def _cause_table(title: str, split: Split) -> Table:
+    from validation.study.causes import ErrorPart
+
     rows: list[Row] = []
-    for entry in methods:
-        if entry["refused"]:
-            rows.append(Row({"label": entry["label"]}, reason=entry["refused"]))
+    for each, _, found in split:
+        if isinstance(found, str):
+            rows.append(Row({"label": each.label}, reason=found))
             continue
-        for at, part in enumerate((entry["whole"], *entry["parts"])):
-            values: dict[str, Value] = {column.key: part.get(column.key) for column in _BY_CAUSE}
-            rows.append(Row(values | {"label": "" if at else entry["label"]}))
-    return table(title, _BY_CAUSE, rows)
+        rows += [Row({**shown_values(part), "label": "" if at else each.label}) for at, part in enumerate(found)]
+    columns = table_of(title, ErrorPart, (), how=_PARTS).columns
+    return table(title, (*words(label="method"), *columns), rows)
 
 
 def _draw_parts(split: list[Any], column: str) -> Any:
@@ -336,9 +336,9 @@ def _draw_parts(split: list[Any], column: str) -> Any:
         reference = np.asarray(given, dtype=np.float64)
         factor = exposure(reference)
         show_picture(line[0], tone_mapped(reference, factor), "reference", size)
-        show_picture(line[1], tone_mapped(reference + parts[0][1], factor), label.replace(" (", "\n("), size)
-        for panel, (part, image) in zip(line[2:], parts):
-            fraction = "" if math.isnan(part["share"]) or part["cause"] == "whole" else f", {100 * part['share']:.0f} %"
-            title = f"{part['cause']}\n{part['relative_rmse']:.1e}{fraction}"
-            show_picture(panel, error_map(reference, reference + image), title, size)
+        show_picture(line[1], tone_mapped(reference + parts[0].image, factor), label.replace(" (", "\n("), size)
+        for panel, part in zip(line[2:], parts):
+            shown = "" if part.fraction is None or part.cause == "whole" else f", {100 * part.fraction:.0f} %"
+            title = f"{part.cause}\n{part.relative_rmse or 0.0:.1e}{shown}"
+            show_picture(panel, error_map(reference, reference + part.image), title, size)
     return figure

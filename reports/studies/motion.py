@@ -2,12 +2,15 @@
 """A study of methods under a light that moves: flicker, lag and ghosts."""
 
 from functools import partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, one_error, pixels_of, telling
 from reports.machine.progress import counted
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import numbers, table, words
+
+if TYPE_CHECKING:
+    from validation.study.motion import MethodMotion
 
 _TURN = 120  # frames of a whole turn in a sweep
 _RUNS = 4  # of a method that draws random numbers
@@ -56,7 +59,7 @@ def motion(
     chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("motion"))
     loaded = opened(scene, pixels_of(size))
     with telling(progress, "motion") as tell:
-        rows = method_motion(
+        found = method_motion(
             loaded.scene,
             loaded.animation,
             chosen,
@@ -72,14 +75,15 @@ def motion(
         *numbers(lag="lag", lag_se="its error", ghost="ghost", ghost_se="its error", pop="pop"),
         *words("verdict"),
     )
+    rows = [each.to_json() for each in found]
     title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
     data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=rows)
     return Study(
-        name="motion", data=data, drawn=(table(title, columns, rows),), rows=tuple(rows), draw=partial(_draw, rows)
+        name="motion", data=data, drawn=(table(title, columns, rows),), rows=tuple(rows), draw=partial(_draw, found)
     )
 
 
-def _draw(rows: list[dict[str, Any]], column: str) -> Any:
+def _draw(found: "list[MethodMotion]", column: str) -> Any:
     """Return the error by frame of each method."""
     from reports.plotting.figure import new_figure
     from reports.plotting.style import WIDTHS
@@ -87,10 +91,10 @@ def _draw(rows: list[dict[str, Any]], column: str) -> Any:
     width = WIDTHS[column]
     figure = new_figure(width, 0.62 * width)
     axes = figure.subplots()
-    for row in rows:
-        if row.get("rmse_by_frame"):
-            axes.plot(row["rmse_by_frame"], label=row["label"])
-    change: list[float] = next((row["change_by_frame"] for row in rows if row.get("change_by_frame")), [])
+    measured = [(each.label, each.measures) for each in found if each.measures]
+    for label, measures in measured:
+        axes.plot(measures.rmse_by_frame, label=label)
+    change = measured[0][1].change_by_frame if measured else ()
     axes.plot(change, color="0.5", linestyle=":", label="change of the reference")
     axes.set(xlabel="frame", ylabel="relative RMSE [1]")
     axes.set_yscale("symlog", linthresh=1e-6)

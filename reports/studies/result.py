@@ -14,7 +14,7 @@ from reports.tables.table import Table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FRACTION = {"digits": 2, "share": True}  #: how an error relative to the reference is printed
+FRACTION = {"digits": 2, "fraction": True}  #: how an error relative to the reference is printed
 ENDINGS = (".csv", ".tex", ".md", ".json", ".pdf", ".png")  #: of the files that `Study.save` writes
 
 

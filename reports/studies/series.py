@@ -6,7 +6,7 @@ from typing import Any
 
 from reports.api.inputs import one_error
 from reports.studies.result import Study
-from reports.tables.table import numbers, table, words
+from reports.tables.table import table_of
 
 _RAYS = 100_000  # quasi-random, of which the fractions are counted
 _THICKNESSES = (0.1, 0.5, 2.0)
@@ -30,7 +30,8 @@ def polynomials() -> Study:
     activate()
     import numpy as np
 
-    from validation.papers.formulas import printed_against_derived
+    from validation.columns import plain
+    from validation.papers.formulas import WithinError, printed_against_derived
 
     theta = np.linspace(-1.5, 1.5, 301)
     rows = []
@@ -40,14 +41,9 @@ def polynomials() -> Study:
             for values in zip(theta.tolist(), *(curves[name].tolist() for name in _CURVES)):
                 rows.append({"phase": phase, "a": a, **dict(zip(("theta", *_CURVES), values))})
     within = list(printed_against_derived(_RAYS))
-    percent = {"percent": True}
-    columns = (
-        *words("phase", "region", "kernel"),
-        *numbers("rays"),
-        *numbers(within_1_percent="within 1 %", within_10_percent="within 10 %", how=percent),
-    )
-    drawn = table("Fractions of rays that a kernel integrates within an error", columns, within)
-    data = {"rays": _RAYS, "within": within, "curves": rows}
+    percent = {key: {"percent": True} for key in ("within_1_percent", "within_10_percent")}
+    drawn = table_of("Fractions of rays that a kernel integrates within an error", WithinError, within, how=percent)
+    data = {"rays": _RAYS, "within": plain(within), "curves": rows}
     return Study(name="polynomials", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw_polynomials, rows))
 
 

@@ -5,7 +5,7 @@ Read in this order:
 
 - `read.py`: the Parquet by columns
 - `samples.py`: one sample a scene for each configuration
-- `claims.py`: shares of scenes within an error, with intervals
+- `claims.py`: fractions of scenes within an error, with intervals
 - `correlations.py`: which property of a scene goes with error
 - `faults.py`: refusals, what is wrong whatever the error, the worst scenes
 - `summary.py`: all of these, worked out once

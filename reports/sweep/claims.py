@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claims: in what fraction of the scenes a configuration keeps an error, with the interval of that share.
+"""Claims: in what fraction of the scenes a configuration keeps an error, with its interval.
 
 A scene counts as within an error if its image was made, all its pixels are finite, and the relative RMSE is at most
 the error. A refusal is no try: refused scenes are counted apart, and so are scenes that have no reference. A cell that
@@ -18,12 +18,12 @@ import numpy as np
 from reports.sweep.samples import FAULTS, UNTOLD, Sample
 from validation.statistics.samples import LEVEL, binomial_interval
 
-TARGETS = (0.1, 0.01, 0.001)  #: relative RMSE of claims, as shares
+TARGETS = (0.1, 0.01, 0.001)  #: relative RMSE of claims, as fractions
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A share of scenes and its interval."""
+    """A fraction of scenes and its interval."""
 
     label: str  #: of the configuration
     target: float  #: relative RMSE [1]
@@ -37,14 +37,14 @@ class Claim:
     level: float = LEVEL
 
     @property
-    def share(self) -> float | None:
+    def fraction(self) -> float | None:
         """Of the scenes that are within the error for sure; None of no scene."""
         return self.within / self.tries if self.tries else None
 
     @property
-    def share_words(self) -> str:
-        """The share with its interval, and what is not in it, in words."""
-        words = f"in {percent(self.share or 0.0, self.tries)} % of {scenes_words(self.tries)}, "
+    def fraction_words(self) -> str:
+        """The fraction with its interval, and what is not in it, in words."""
+        words = f"in {percent(self.fraction or 0.0, self.tries)} % of {scenes_words(self.tries)}, "
         words += f"{percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
         if self.undecided:
             words += f"; the reference is not exact enough to tell in {scenes_words(self.undecided)}"
@@ -54,7 +54,7 @@ class Claim:
     @property
     def text(self) -> str:
         """The claim as a sentence."""
-        within = f"within {written(self.target)} {self.share_words}" if self.tries else "no scene was tried"
+        within = f"within {written(self.target)} {self.fraction_words}" if self.tries else "no scene was tried"
         return f"{self.label}: {within}."
 
 
@@ -97,13 +97,13 @@ def scenes_words(count: int) -> str:
     return "one scene" if count == 1 else f"{count} scenes"
 
 
-def percent(share: float, trials: int) -> str:
-    """Return a share in per cent, to the digits that so many trials can tell apart, never rounded up to all or none."""
+def percent(fraction: float, trials: int) -> str:
+    """Return a fraction in per cent, to the digits that so many trials tell apart, never rounded up to all or none."""
     places = max(0, int(np.ceil(np.log10(max(trials, 1)))) - 2)
-    text = f"{100 * share:.{places}f}"
-    if share < 1 and float(text) == 100:
+    text = f"{100 * fraction:.{places}f}"
+    if fraction < 1 and float(text) == 100:
         text = f"{100 - 10.0**-places:.{places}f}"
-    if share > 0 and float(text) == 0:
+    if fraction > 0 and float(text) == 0:
         text = f"{10.0**-places:.{places}f}"
     return text
 

@@ -122,9 +122,9 @@ def natural(text: str) -> tuple[str | int, ...]:
 def _current(columns: Mapping[str, NDArray[Any]]) -> list[int]:
     """Return the rows that count: of each cell one.
 
-    The folder of a sweep keeps what earlier source code computed, faults that are mended among it, and a cell may have
-    been computed once for its error and once with the machine to itself for its time. The row of the source code that
-    computed the cell last counts; of several such rows one that was timed alone, and else the last.
+    The folder of a sweep keeps what earlier source code computed, with faults that were fixed since, and a cell may
+    have been computed once for its error and once with the machine to itself for its time. The row of the source code
+    that computed the cell last counts; of several such rows one that was timed alone, and else the last.
     """
     rows = range(len(columns["key"]))
 

@@ -100,15 +100,15 @@ def headlines(said: Summary) -> list[Headline]:
         best = best_claims(said.claims, target)
         if best:
             others = f" and {len(best) - 1} more" if best[1:] else ""
-            add(f"Most often within {written(target)}", f"{best[0].label}{others}, {best[0].share_words}.")
+            add(f"Most often within {written(target)}", f"{best[0].label}{others}, {best[0].fraction_words}.")
     for each in said.fastest:
         if each.scenes and sum(each.counts):
             place = int(np.argmax(each.counts))
             none = f"; in {each.none} none is within it" if each.none else ""
-            share = percent(each.counts[place] / each.scenes, each.scenes)
+            fraction = percent(each.counts[place] / each.scenes, each.scenes)
             add(
                 f"Fastest within {written(each.target)}",
-                f"{said.samples[place].label}, in {share} % of {each.scenes} scenes{none}.",
+                f"{said.samples[place].label}, in {fraction} % of {each.scenes} scenes{none}.",
             )
     leading = Counter(chosen[0].property for chosen in said.strongest.values() if chosen)
     if leading:
@@ -169,7 +169,7 @@ def to_json(said: Summary) -> dict[str, Any]:
         "level": LEVEL,
         **{name: plain(getattr(said, name)) for name in (*counts, "versions", "started", "worst", *lists)},
         "headlines": plain(headlines(said)),
-        "claims": [plain(each) | {"share": each.share, "text": each.text} for each in said.claims],
+        "claims": [plain(each) | {"fraction": each.fraction, "text": each.text} for each in said.claims],
         "configurations": [_configuration(sample) for sample in said.samples],
         "fastest": [plain(each) | {"counts": dict(zip(names, each.counts))} for each in said.fastest],
         "goes_with": {label: [each.property for each in said.strongest[label]] for label in names},

@@ -1,10 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The tables of a sweep, for its page, its digest and the terminal."""
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import Any
-
 import numpy as np
 
 from reports.sweep.claims import TARGETS, written
@@ -12,10 +8,9 @@ from reports.sweep.correlations import property_words
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
 from reports.sweep.summary import Summary, quantiles
-from reports.tables.table import Column, Measured, Name, Table, numbers, table, words
-from validation.columns import columns_of
+from reports.tables.table import Column, Measured, Name, Table, numbers, table, table_of, words
 
-_SHARE = {"digits": 2, "share": True}
+_FRACTION = {"digits": 2, "fraction": True}
 
 
 def errors_table(said: Summary) -> Table:
@@ -26,7 +21,7 @@ def errors_table(said: Summary) -> Table:
             Column(f"within_{target:g}", f"within {written(target)}", percent=True, spread="95 %", places=1)
             for target in reversed(TARGETS)
         ),
-        *numbers(median="median error", most="95 % of scenes below", how=_SHARE),
+        *numbers(median="median error", most="95 % of scenes below", how=_FRACTION),
         *numbers(scenes="scenes", refused="refused", untold="no reference"),
         Column("lost", "not done", alarm=True),
     )
@@ -43,8 +38,8 @@ def errors_table(said: Summary) -> Table:
             "most": values[1].value if values else None,
         }
         for claim in said.claims:
-            if claim.label == sample.label and claim.share is not None:
-                row[f"within_{claim.target:g}"] = Measured(claim.share, claim.low, claim.high)
+            if claim.label == sample.label and claim.fraction is not None:
+                row[f"within_{claim.target:g}"] = Measured(claim.fraction, claim.low, claim.high)
         rows.append(row)
     explanation = (
         "Error: relative RMSE of the airlight. Each fraction has its interval at 95 % confidence. Scenes that are "
@@ -133,7 +128,7 @@ def checks_table(said: Summary) -> Table:
     """Return how many images were checked for each fault and how many have it."""
     how = {"faulty_rows": {"alarm": True}, "faulty_scenes": {"alarm": True}, "meaning": {"long": True, "minor": True}}
     shown = [each for each in said.checks if each.rows]
-    return _table_of("Images that were checked", Check, shown, how=how)
+    return table_of("Images that were checked", Check, shown, how=how)
 
 
 def faults_table(said: Summary, most: int = 30) -> Table:
@@ -142,21 +137,4 @@ def faults_table(said: Summary, most: int = 30) -> Table:
     left = len(said.faults) - most
     explanation = f"{left} more are in --json." if left > 0 else ""
     how = {"command": {"long": True, "minor": True}}
-    return _table_of("Images at fault", Fault, rows, explanation=explanation, how=how)
-
-
-def _table_of(
-    title: str,
-    record: type,
-    rows: Sequence[Any],
-    *,
-    explanation: str = "",
-    how: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
-) -> Table:
-    """Return the table of some records; `how` are other fields of a column by its key."""
-    columns = [
-        Column(each.key, each.heading, words=each.kind == "string", **how.get(each.key, {}))
-        for each in columns_of(record)
-    ]
-    values = [row if isinstance(row, Mapping) else vars(row) for row in rows]
-    return table(title, columns, values, explanation=explanation)
+    return table_of("Images at fault", Fault, rows, explanation=explanation, how=how)

@@ -79,7 +79,7 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
     estimators = list(dict.fromkeys(entry.estimator for scene in scenes for entry in scene.agreement.values()))
     columns = (
         *words("scene"),
-        *numbers(bound="bound of its error", how={"share": True, "digits": 2}),
+        *numbers(bound="bound of its error", how={"fraction": True, "digits": 2}),
         *numbers(left="unresolved shadow rays", how={"alarm": True}),
         *(Column(name, f"95 % interval by {name}", percent=True, sign=True, digits=2) for name in estimators),
         *(Column(f"{name} agrees", "inside its margin") for name in estimators),
@@ -139,17 +139,17 @@ def _values(name: str, comparison: Agreement) -> dict[str, Value]:
 
 
 def left_out_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
-    """Return for every scene of a report the shares of light that single scattering leaves out."""
-    share = {"percent": True}
+    """Return for every scene of a report the fractions of light that single scattering leaves out."""
+    percent = {"percent": True}
     columns = (
         *words("scene"),
-        *numbers(medium="of the airlight", medium_interval="95 % interval", how=share),
-        *numbers(everything="of all light", everything_interval="95 % interval", how=share),
+        *numbers(medium="of the airlight", medium_interval="95 % interval", how=percent),
+        *numbers(everything="of all light", everything_interval="95 % interval", how=percent),
         *numbers(max_depth="max. edges"),
     )
     explanation = (
-        "Shares of all light that paths of up to max. edges bring, with 95 % intervals; the second adds surfaces that "
-        "light one another."
+        "Fractions of all light that paths of up to max. edges bring, with 95 % intervals; the second adds surfaces "
+        "that light one another."
     )
     rows = (_left_out(scene, Name(scene.name) if code else scene.name) for scene in scenes)
     return table("Multiple scattering", columns, rows, explanation=explanation)
@@ -158,6 +158,6 @@ def left_out_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
 def _left_out(scene: Scene, name: Value) -> Row:
     multiple = scene.multiple
     values: dict[str, Value] = {"scene": name, "max_depth": multiple.max_depth}
-    for key, share in (("medium", multiple.medium), ("everything", multiple.everything)):
-        values |= {key: share.value, f"{key}_interval": Interval.of(share.interval)}
+    for key, found in (("medium", multiple.medium), ("everything", multiple.everything)):
+        values |= {key: found.value, f"{key}_interval": Interval.of(found.interval)}
     return Row(values)

@@ -44,7 +44,7 @@ class _Style:
     dash: str = "-"
     between: str = ".."  #: the ends of an interval
     percent: str = " %"
-    shares: bool = False  #: in per cent
+    fractions: bool = False  #: in per cent
     zeros: bool = False  #: whether zeros at the end of numbers are kept: they say how exact a number is
 
 
@@ -108,8 +108,8 @@ def _fitted(
         places.remove(left[-1])
     room = width - _width([least[place] for place in places])
     wanted = [natural[place] - least[place] for place in places]
-    share = min(1.0, max(0, room) / (sum(wanted) or 1))
-    widths: list[int | None] = [least[place] + int(share * more) for place, more in zip(places, wanted)]
+    part = min(1.0, max(0, room) / (sum(wanted) or 1))
+    widths: list[int | None] = [least[place] + int(part * more) for place, more in zip(places, wanted)]
     if not left:
         return places, widths, ""
     names = ", ".join(columns[place].title for place in sorted(left))
@@ -162,7 +162,7 @@ def markdown(table: Table) -> str:
 
 
 def html(table: Table) -> str:
-    """Return a table as HTML, in a box that scrolls sideways; shares are in per cent."""
+    """Return a table as HTML, in a box that scrolls sideways; fractions are in per cent."""
     head = "".join(f'<th scope="col"{_layout(column)}>{_in_html(column.title)}</th>' for column in table.columns)
     named = f' role="group" aria-label="{_in_html(table.title)}"' if table.title else ""
     lines = [f'<div class="scroll" tabindex="0"{named}><table>']
@@ -255,7 +255,7 @@ def text_of(value: Value) -> str:
 
 def _cell(value: Value, column: Column, style: _Style) -> str:
     """Return a value as a format writes it; of what was measured the median alone."""
-    percent = column.percent or (column.share and style.shares)
+    percent = column.percent or (column.fraction and style.fractions)
 
     def written(number: float) -> str:
         return style.digits(digits_of(number, column, zeros=style.zeros, percent=percent))
@@ -351,7 +351,7 @@ def _name_in_html(name: Name) -> str:
     return f'<a href="{_in_html(name.target)}">{code}</a>' if name.target else code
 
 
-_HTML = _Style(_in_html, typeset, _name_in_html, DASH, " … ", shares=True)
+_HTML = _Style(_in_html, typeset, _name_in_html, DASH, " … ", fractions=True)
 
 
 def _layout(column: Column) -> str:

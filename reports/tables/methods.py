@@ -33,7 +33,7 @@ _MEANINGS = {column.key: column.meaning for column in columns_of(Metrics)} | mea
 _MEANINGS |= {key: _OF_ROWS[key] for key in ("device", "memory", "flip")}
 _MEANINGS["nonfinite"] = "pixels that are no number, which errors leave out"
 
-_MS, _RATE, _SHARE, _MINOR = {"unit": "ms"}, {"whole": True}, {"digits": 2, "share": True}, {"minor": True}
+_MS, _RATE, _FRACTION, _MINOR = {"unit": "ms"}, {"whole": True}, {"digits": 2, "fraction": True}, {"minor": True}
 COLUMNS = {
     column.key: replace(column, meaning=_MEANINGS.get(column.key, ""))
     for column in (
@@ -50,7 +50,7 @@ COLUMNS = {
             how=_MS | _MINOR,
         ),
         *numbers(memory="memory [MiB]", how=_RATE | _MINOR),
-        *numbers("p99", "max", relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="median error", how=_SHARE),
+        *numbers("p99", "max", relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="median error", how=_FRACTION),
         *numbers(flip="HDR-FLIP"),
         *numbers(nonfinite="not finite", how={"alarm": True}),
     )

@@ -7,6 +7,7 @@ are here: which columns there are, and how a number becomes digits.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # making its classes would take a tenth of the time of `airlight --help`
@@ -68,8 +69,8 @@ class Column:
     places: int | None = None  #: digits behind the point, in place of significant digits
     whole: bool = False  #: rates: no digits behind the point from ten on, one digit below
     sign: bool = False  #: positive numbers have a plus
-    percent: bool = False  #: a share, written in per cent
-    share: bool = False  #: a share that HTML writes in per cent and the others as it is
+    percent: bool = False  #: a fraction, written in per cent
+    fraction: bool = False  #: a fraction that HTML writes in per cent and the others as it is
     spread: str = ""  #: heading of the quartiles of `Measured`, in a column of their own where cells have no room
     alarm: bool = False  #: anything but zero is bad
     meaning: str = ""  #: what its values are, in words; HTML explains it below the table
@@ -134,6 +135,25 @@ def table(
     return Table(title, known, tuple(map(row, rows)), explanation)
 
 
+def table_of(
+    title: str,
+    record: type,
+    rows: Iterable[Any],
+    *,
+    explanation: str = "",
+    how: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+) -> Table:
+    """Return the table of some records, or of mappings; `how` are other fields of a column by its key."""
+    from validation.columns import columns_of
+
+    columns = [
+        Column(each.key, each.heading, words=each.kind == "string", **how.get(each.key, {}))
+        for each in columns_of(record)
+    ]
+    values = [row if isinstance(row, Mapping) else vars(row) for row in rows]
+    return table(title, columns, values, explanation=explanation)
+
+
 def words(*keys: str, how: Mapping[str, Any] | None = None, **headings: str) -> tuple[Column, ...]:
     """Return columns of text: keys that are their own headings, then keys with their headings."""
     return numbers(*keys, how={"words": True, **(how or {})}, **headings)
@@ -158,7 +178,7 @@ def number(value: float | None, digits: int = 3, *, zeros: bool = False) -> str:
 def digits_of(value: float, column: Column, *, zeros: bool = False, percent: bool = False) -> str:
     """Return a number of a column in ASCII digits, without what stands behind it.
 
-    With `percent` a share is in per cent although the column does not ask for it.
+    With `percent` a fraction is in per cent although the column does not ask for it.
     """
     shown = 100 * value if percent or column.percent else value
     if isinstance(value, int) and shown is value:
@@ -168,8 +188,8 @@ def digits_of(value: float, column: Column, *, zeros: bool = False, percent: boo
     elif column.whole:
         text = f"{shown:.0f}" if abs(shown) >= 10 else f"{shown:.1f}"
     else:
-        # Shares in per cent have at least three digits.
-        text = number(shown, max(column.digits, 3) if percent and column.share else column.digits, zeros=zeros)
+        # Fractions in per cent have at least three digits.
+        text = number(shown, max(column.digits, 3) if percent and column.fraction else column.digits, zeros=zeros)
     return f"+{text}" if column.sign and shown > 0 else text
 
 

@@ -258,17 +258,21 @@ MEDIUM = (
     Fault("phase", "the phase function is Rayleigh's", _every_phase(_rayleigh), needs=("fog",)),
     Fault("phase", "a cosine was taken for the phase function", _every_phase(_cosine), needs=("fog",)),
     *(
-        Fault(name, f"the way {words} is not attenuated", with_law(**{name.replace("-", "_"): (0.0, 0.0)}))
-        for name, words in (("light-leg", "from the light"), ("camera-leg", "to the camera"))
+        Fault(
+            name,
+            f"the way {words} is not attenuated",
+            with_law(**{name.replace("path", "leg").replace("-", "_"): (0.0, 0.0)}),
+        )
+        for name, words in (("light-path", "from the light"), ("camera-path", "to the camera"))
     ),
     *(
         Fault(
-            name,
+            f"{of}-path",
             f"the way {words} is not attenuated for {which}",
-            with_law(**{name.replace("-", "_"): legs}),
+            with_law(**{f"{of}_leg": legs}),
             needs=("both",),
         )
-        for name, words in (("light-leg", "from the light"), ("camera-leg", "to the camera"))
+        for of, words in (("light", "from the light"), ("camera", "to the camera"))
         for which, legs in (("the fog, for surfaces it is", (0.0, 1.0)), ("surfaces, for the fog it is", (1.0, 0.0)))
     ),
     Fault(

@@ -217,6 +217,6 @@ def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str
     if abs(size[0] * height / width - size[1]) >= 1 and abs(size[1] * width / height - size[0]) >= 1:
         raise InputError(
             f"{path} is {size[0]} x {size[1]} pixels, {size[0] / size[1]:.4g} to 1; {loaded.name} is {width} x "
-            f"{height}, {width / height:.4g} to 1: render it at that size or a multiple or share of it"
+            f"{height}, {width / height:.4g} to 1: render it at that size or a multiple or a fraction of it"
         )
     return load_scene(scene, size)

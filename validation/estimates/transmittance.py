@@ -20,7 +20,7 @@ every step, which gives the unbiased estimate X = (l/n) sum sigma_t of tau.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +29,26 @@ from analytic.errors import InputError
 from reference.quadrature.fields import field_of
 from reference.scene.density_grid import GridMedium
 from reference.scene.read import ReferenceScene
+from validation.columns import column
 
 Array = NDArray[np.float64]
 Look = Callable[[Array], Array]  # shares of a ray, any shape -> optical depth of the whole ray if all were as there
 
 _ORDER_0, _SURE, _RATE = 0.9, 2, 2.0  # of the roulette
 _RAYS, _TIMES = 48, 1024
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransmittanceError:
+    """How wrong an estimator is along rays, relative to the mean transmittance of these."""
+
+    estimator: str = column()
+    steps: int = column(meaning="of a march, or how many times the majorant's optical depth")
+    look_ups: float = column("look-ups", meaning="of a ray, on the average")
+    bias: float = column()
+    bias_error: float = column("its error", meaning="standard error of the bias")
+    jensen: float | None = column("by Jensen", meaning="brightening by the variance of a march; None for others")
+    spread: float = column("std. dev.", meaning="root of the mean variance of one estimate")
 
 
 def marches(look: Look, random: np.random.Generator, times: int, steps: int) -> Array:
@@ -94,16 +108,13 @@ def transmittance_errors(
     steps: Sequence[int],
     *,
     progress: Callable[[float, str], None] | None = None,
-) -> list[dict[str, Any]]:
+) -> list[TransmittanceError]:
     """Return how wrong the estimators are along rays through the grid of a scene, a row for each and its steps.
 
     `steps`: of the marches; `progress`: called with (fraction done, what).
 
-    Rays go between random places in the box; each has 1024 estimates by each `estimator`. A row has `steps` of a march,
-    or how many times the majorant's optical depth; `look_ups` a ray, on the average; and, relative to the mean
-    transmittance of the rays, `bias` with its standard error `bias_error`, `spread`, the root of the mean variance of
-    one estimate, and `jensen`, the brightening that follows from the variance of a march, to second order, None for
-    others. Raises InputError for a scene without a grid.
+    Rays go between random places in the box; each has 1024 estimates by each estimator. Raises InputError for a scene
+    without a grid.
     """
     medium = reference.medium
     if not isinstance(medium, GridMedium):
@@ -143,15 +154,15 @@ def transmittance_errors(
     return [_over_rays(name, count, np.array(rays), exact) for (name, count), rays in sorted(found.items())]
 
 
-def _over_rays(name: str, count: int, rays: Array, exact: Array) -> dict[str, Any]:
+def _over_rays(name: str, count: int, rays: Array, exact: Array) -> TransmittanceError:
     look_ups, mean, variance, depth_variance = rays.T
     scale = exact.mean()
-    return {
-        "estimator": name,
-        "steps": count,
-        "look_ups": float(look_ups.mean()),
-        "bias": float((mean - exact).mean() / scale),
-        "bias_error": float(np.sqrt(variance.sum() / _TIMES) / _RAYS / scale),
-        "spread": float(np.sqrt(variance.mean()) / scale),
-        "jensen": float((0.5 * exact * depth_variance).mean() / scale) if name == "naive" else None,
-    }
+    return TransmittanceError(
+        estimator=name,
+        steps=count,
+        look_ups=float(look_ups.mean()),
+        bias=float((mean - exact).mean() / scale),
+        bias_error=float(np.sqrt(variance.sum() / _TIMES) / _RAYS / scale),
+        jensen=float((0.5 * exact * depth_variance).mean() / scale) if name == "naive" else None,
+        spread=float(np.sqrt(variance.mean()) / scale),
+    )

@@ -12,7 +12,7 @@ be missing. An x1 of `inf` is a ray that never ends.
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -54,23 +54,17 @@ class Cases:
     rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again; none from memory
 
 
-def read_cases(path: str | Path, *, phase: str | None = None) -> Cases:
+def read_cases(path: str | Path) -> Cases:
     """Read a table of cases.
 
-    `path`: a CSV file with a header line; see the module's docstring for the columns; `phase`: words of a phase
-    function for all rows, in place of the column, which may then be missing; the values of the file, which are of
-    others, are left out. Raises InputError for a file that cannot be read, a missing column, a word where a number
-    belongs, a number out of its range or an unknown phase function: the message names file, line (from 1, the header)
-    and column.
+    `path`: a CSV file with a header line; see the module's docstring for the columns. Raises InputError for a file that
+    cannot be read, a missing column, a word where a number belongs, a number out of its range or an unknown phase
+    function: the message names file, line (from 1, the header) and column.
     """
     header, lines = _read_text(Path(path))
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
-    if phase is not None:
-        phase_from_words(phase)
-        columns["phase"] = (phase,) * len(lines)
     rows = tuple(zip(*columns.values(), strict=True))
-    cases = _checked(_Table(str(path), columns, tuple(number for number, _ in lines)), rows)
-    return cases if phase is None else replace(cases, value=None)
+    return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)), rows)
 
 
 def cases_from_columns(columns: Mapping[str, Any], *, name: str = "cases") -> tuple[Cases, tuple[int, ...]]:

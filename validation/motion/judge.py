@@ -267,7 +267,7 @@ class _Frames:
     def masks(self) -> tuple[str, ...]:
         """Return the masks that some pixel of some frame is in."""
         moved, lamps = self._uncovered.any(), self._beside.any()
-        return ("all", *(("disoccluded", "rest") if moved else ()), *(("beside a lamp",) if lamps else ()))
+        return ("all", *(("disoccluded", "rest") if moved else ()), *(("next to a light",) if lamps else ()))
 
     def sequence(self, mask: str) -> Sequence:
         """Return the sequence with the pixels of a mask."""

@@ -22,8 +22,9 @@ only start the filter. Values that are not finite are counted, and left out: the
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ from validation.statistics.comparison import block_sums
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+_Record = TypeVar("_Record", "Measures", Lag)
 
 AGES = 12  #: of light that left [frames]
 STARTING = 16  #: frames that only start the filter of a sequence without a first reset
@@ -116,6 +118,24 @@ def measure(sequence: Sequence) -> Measures | None:
         return None
     lag = fit_lag(first.cells(sequence))
     return _second_pass(sequence, first, lag)
+
+
+def mean_measures(runs: list[Measures]) -> Measures:
+    """Return the means over runs of what has an error, with errors from their spread; the rest is that of the first."""
+    return runs[0] if len(runs) == 1 else replace(_means(runs), lag=_means([each.lag for each in runs]))
+
+
+def _means(records: list[_Record]) -> _Record:
+    found: dict[str, Any] = {}
+    for each in fields(records[0]):
+        several = [getattr(record, each.name) for record in records]
+        if isinstance(several[0], Estimate):
+            values = [estimate.value for estimate in several]
+            if None not in values:
+                found[each.name] = Estimate(
+                    float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(len(values)))
+                )
+    return replace(records[0], **found)
 
 
 class _FirstPass:

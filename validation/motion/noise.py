@@ -281,7 +281,7 @@ class NoiseComparison:
             + ", ".join(f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)),
             "error spectrum   "
             + " ".join(f"{each:.3g}" for each in noise.spectrum)
-            + f"; low share {noise.low_share:.3g}",
+            + f"; at low frequencies {noise.low_share:.3g}",
             "blurred          "
             + ", ".join(
                 f"{blur:g} px: {100 * error:.3g} % (gain {gain:.3g})"

@@ -15,10 +15,10 @@ near-foot       both ends within one radian of the foot of the perpendicular, as
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +29,11 @@ from analytic.phase import PhaseFunction
 from analytic.series import taylor_coefficients
 from realtime.kernels.exact import exact
 from realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
+from validation.columns import column
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import Kernel, evaluate_cases
 from validation.kernels.rays import wide_rays
+from validation.metrics.errors import known
 
 Array = NDArray[np.float64]
 
@@ -108,9 +110,9 @@ def _within_ten_percent() -> dict[str, float]:
     """Return the fraction of moderate rays on which the isotropic polynomials are within 10 %."""
     kernels = {"printed": COMPARED["taylor-printed"], "derived": COMPARED["taylor"]}
     return {
-        f"within 10 %, {each['kernel']}": each["within_10_percent"]
+        f"within 10 %, {each.kernel}": known(each.within_10_percent)
         for each in printed_against_derived(_WIDE_RAYS, kernels=kernels)
-        if (each["phase"], each["region"]) == ("isotropic", "moderate")
+        if (each.phase, each.region) == ("isotropic", "moderate")
     }
 
 
@@ -142,13 +144,22 @@ def _droplets() -> dict[str, float]:
     }
 
 
-def printed_against_derived(
-    count: int = 100_000, *, kernels: Mapping[str, Kernel] = COMPARED
-) -> Iterator[dict[str, Any]]:
+@dataclass(frozen=True)
+class WithinError:
+    """How many rays a kernel integrates within an error."""
+
+    phase: str = column()
+    region: str = column()
+    kernel: str = column()
+    rays: int = column()
+    within_1_percent: float | None = column("within 1 %", meaning="fraction of the rays; None without any")
+    within_10_percent: float | None = column("within 10 %", meaning="fraction of the rays; None without any")
+
+
+def printed_against_derived(count: int = 100_000, *, kernels: Mapping[str, Kernel] = COMPARED) -> Iterator[WithinError]:
     """Yield for each of the paper's phase functions, region and kernel which fraction of rays is how accurate.
 
-    Of each phase function there are `count` rays, at most 2^20; a power of two keeps them balanced. A row has `phase`,
-    `region`, `kernel`, how many `rays`, and of these the fractions `within_1_percent` and `within_10_percent`.
+    Of each phase function there are `count` rays, at most 2^20; a power of two keeps them balanced.
     """
     for phase in PRINTED_PHASES:
         cases = wide_rays(count, phase)
@@ -156,8 +167,7 @@ def printed_against_derived(
         errors = {name: relative_errors(cases, function) for name, function in kernels.items()}
         for (region, chosen), (name, error) in product(regions.items(), errors.items()):
             of = error[chosen]
-            within = {f"within_{percent}_percent": _within(of, percent / 100) for percent in (1, 10)}
-            yield {"phase": phase, "region": region, "kernel": name, "rays": len(of), **within}
+            yield WithinError(phase, region, name, len(of), _within(of, 0.01), _within(of, 0.1))
 
 
 def relative_errors(cases: Cases, function: Kernel) -> Array:
@@ -181,5 +191,5 @@ def _near_foot(cases: Cases) -> NDArray[np.bool_]:
     return np.maximum(*ends) <= _NEAR_FOOT
 
 
-def _within(error: Array, bound: float) -> float:
-    return float(np.mean(error <= bound)) if len(error) else float("nan")
+def _within(error: Array, bound: float) -> float | None:
+    return float(np.mean(error <= bound)) if len(error) else None

@@ -9,6 +9,7 @@ frames look up, and the paper's 22 functions, fitted to the grid.
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -113,18 +114,28 @@ def transport_figures() -> dict[str, Any]:
     """Return by how much the 22 functions are off in half of the directions, the median over the curves [%]."""
     medians = []
     for curve in transport_curves():
-        shown = curve["exact"] > _DIM * curve["all"]
+        shown = curve.exact > _DIM * curve.whole
         if shown.any():
-            medians.append(np.median(np.abs(curve["fit"][shown] / curve["exact"][shown] - 1)))
+            medians.append(np.median(np.abs(curve.fit[shown] / curve.exact[shown] - 1)))
     return {"fit, median": 100 * float(np.median(medians))}
 
 
-def transport_curves() -> list[dict[str, Any]]:
-    """Return T of Fig. 8 by direction.
+@dataclass(frozen=True, kw_only=True)
+class TransportCurve:
+    """T of Fig. 8 of some orders by the zenith angle of the view, in the plane of the sun [1/sr]."""
 
-    Each has `thickness` and `depth` [m], `orders`, and by zenith angle of the view, `angle` [degrees], in the plane of
-    the sun: `exact`, `grid`, `fit`, and `all`, the light of all sets [1/sr].
-    """
+    thickness: float  #: [m]
+    depth: float  #: [m]
+    orders: str
+    angle: Array  #: [degrees]
+    exact: Array
+    grid: Array
+    fit: Array
+    whole: Array  #: of all sets of orders
+
+
+def transport_curves() -> list[TransportCurve]:
+    """Return T of Fig. 8 by direction."""
     pair, types = phase_pair("mie-modified"), array_types("single")
     grid = on_device(canonical_transport(pair.deterministic, 1.0), types)
     fit = fit_on_device(fitted_functions(pair.deterministic, 1.0, grid, types), types)
@@ -142,9 +153,18 @@ def transport_curves() -> list[dict[str, Any]]:
         for place, depth in enumerate(depths):
             for orders in range(len(SETS)):
                 looked_up, fitted = (_looked_up(each, types, orders, t, at[place], angles) for each in (grid, fit))
-                curve = {"exact": exact[orders, place], "grid": looked_up, "fit": fitted, "all": exact[:, place].sum(0)}
-                named = {"thickness": thickness, "depth": depth, "orders": set_name(orders)}
-                curves.append(named | {"angle": np.degrees(angles)} | curve)
+                curves.append(
+                    TransportCurve(
+                        thickness=thickness,
+                        depth=depth,
+                        orders=set_name(orders),
+                        angle=np.degrees(angles),
+                        exact=exact[orders, place],
+                        grid=looked_up,
+                        fit=fitted,
+                        whole=exact[:, place].sum(0),
+                    )
+                )
     return curves
 
 

@@ -59,7 +59,7 @@ def slab_request(
             f"sun: got {sun:g}, wanted a zenith angle from 0 to below 90 degrees; at 90 no light enters the slab"
         )
     if not 0 <= albedo <= 1:
-        raise InputError(f"albedo: got {albedo:g}, wanted a share of 0 to 1")
+        raise InputError(f"albedo: got {albedo:g}, wanted a fraction from 0 to 1")
     return SlabRequest(
         tau=tau,
         sun=sun,

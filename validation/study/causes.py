@@ -11,17 +11,16 @@ the best that the method can do. E is the exact sum over the same light samples,
 pixel by pixel: by its causes, the rest, and the light samples in place of the light's extent. In a scene without lights
 with extent E is the reference. If the method says that its last cause is all that is left, that takes the rest.
 
-With <a, b> the mean of a b over pixels and channels, the *share* of a part P in the error D = R_0 - T is
+With <a, b> the mean of a b over pixels and channels, the *fraction* of a part P in the error D = R_0 - T is
 
     <P, D> / <D, D>,
 
-so that the shares add up to 1. A share below 0 is of a part that hides others.
+so that the fractions add up to 1. A fraction below 0 is of a part that hides others.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +29,7 @@ from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
 from realtime.parameters import values
 from realtime.scene.read_scene import Scene
+from validation.columns import column
 from validation.study.configuration import Configuration
 
 Array = NDArray[np.float64]
@@ -37,15 +37,21 @@ Array = NDArray[np.float64]
 REST, POINTS = "rest", "light samples"
 
 
-#: What a table says of a part of an error, and its signed image, (height, width, 3) [W/(m^2 sr)]: `cause`; `without`,
-#: what has this cause no more, values of parameters, 'exact sum' or 'reference'; `relative_rmse` and `relative_bias`,
-#: over the mean of the reference; and the `share` in the square of the whole error, NaN where there is none.
-Part = tuple[dict[str, Any], Array]
+@dataclass(frozen=True, kw_only=True)
+class ErrorPart:
+    """A part of an error, or the whole."""
+
+    cause: str = column("error by")
+    without: str = column("gone with", meaning="values of parameters, 'exact sum' or 'reference'")
+    relative_rmse: float | None = column("rel. RMSE", meaning="over the mean of the reference")
+    relative_bias: float | None = column("rel. bias", meaning="over the mean of the reference")
+    fraction: float | None = column("fraction of the whole", meaning="in the square of the whole error")
+    image: Array  #: signed, (height, width, 3) [W/(m^2 sr)]
 
 
 def decompose(
     scene: Scene, chosen: Configuration, reference: Array, airlight: Callable[[Configuration], Array]
-) -> list[Part]:
+) -> list[ErrorPart]:
     """Return the whole error of a configuration, and the parts by its causes, which add up to it.
 
     The reference is that at pixel centres, (height, width, 3) [W/(m^2 sr)]; `airlight` renders a configuration in the
@@ -68,7 +74,7 @@ def decompose(
     images = [np.asarray(image, dtype=np.float64) for image in (*images, reference)]
     whole = images[0] - images[-1]
     parts = [whole, *(before - after for before, after in pairwise(images))]
-    return [(_numbers(*words, part, whole, images[-1]), part) for words, part in zip(named, parts, strict=True)]
+    return [_part(*words, part, whole, images[-1]) for words, part in zip(named, parts, strict=True)]
 
 
 def _configurations(chosen: Configuration, size: tuple[int, int]) -> Iterator[tuple[str, Configuration | None]]:
@@ -96,13 +102,14 @@ def _changes(before: Configuration, after: Configuration) -> str:
     return ", ".join([f"kernel={after.kernel}"] * (before.kernel != after.kernel) + words)
 
 
-def _numbers(cause: str, without: str, image: Array, whole: Array, reference: Array) -> dict[str, Any]:
+def _part(cause: str, without: str, image: Array, whole: Array, reference: Array) -> ErrorPart:
     mean, square = float(reference.mean()), float(np.mean(whole * whole))
     rmse, bias = float(np.sqrt(np.mean(image * image))), float(image.mean())
-    return {
-        "cause": cause,
-        "without": without,
-        "relative_rmse": rmse / mean if mean > 0 else np.nan,
-        "relative_bias": bias / mean if mean > 0 else np.nan,
-        "share": float(np.mean(image * whole)) / square if square > 0 else np.nan,
-    }
+    return ErrorPart(
+        cause=cause,
+        without=without,
+        relative_rmse=rmse / mean if mean > 0 else None,
+        relative_bias=bias / mean if mean > 0 else None,
+        fraction=float(np.mean(image * whole)) / square if square > 0 else None,
+        image=image,
+    )

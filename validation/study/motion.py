@@ -6,9 +6,8 @@ method that keeps something of its last frames gets it, as in `airlight render -
 numbers are rendered in several runs: their numbers are means over these, with errors from the spread of the runs.
 """
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
@@ -20,8 +19,8 @@ from realtime.frame.renderer import FrameRenderer
 from realtime.scene.read_scene import Scene, read_scene
 from validation.estimates.quadrature import reference_image
 from validation.motion.judge import motion_verdict
+from validation.motion.measures import Measures, mean_measures, measure
 from validation.motion.measures import Sequence as Frames
-from validation.motion.measures import measure
 from validation.scenes.animation import animate, frame_changes
 from validation.scenes.changes import change_scene
 from validation.scenes.registry import Animation
@@ -35,6 +34,19 @@ BEFORE = 8  #: frames at rest before a step
 _JUMP = 12  # of a turn, that a step is
 
 
+@dataclass(frozen=True)
+class MethodMotion:
+    """What the frames of a method are like under a light that moves."""
+
+    label: str
+    measures: Measures | None  #: None where the reference is dark
+    verdict: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return every number by name."""
+        return {"label": self.label, "verdict": self.verdict} | (self.measures.to_json() if self.measures else {})
+
+
 def method_motion(
     scene: Any,
     animation: Animation,
@@ -45,8 +57,8 @@ def method_motion(
     turn: int = 120,
     runs: int = 4,
     progress: Progress | None = None,
-) -> list[dict[str, Any]]:
-    """Return a row for each configuration: its name, its measures by name, and the verdict.
+) -> list[MethodMotion]:
+    """Return what each configuration is like.
 
     `scene`: the `mi.Scene`, at its own size; `animation`: that of the scene, of which the lights move; `turn`: frames
     of a whole turn of a sweep; `runs`: of a method that draws random numbers. Raises InputError for a scene whose
@@ -75,20 +87,8 @@ def method_motion(
             several.append(measure(Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere)))
         found = [each for each in several if each is not None]
         words = motion_verdict(found[0]).words if found else "the reference is dark"
-        rows.append(
-            {"label": chosen.label, "verdict": words} | (_mean([each.to_json() for each in found]) if found else {})
-        )
+        rows.append(MethodMotion(chosen.label, mean_measures(found) if found else None, words))
     return rows
-
-
-def _mean(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the means over runs of what has an error, with errors from their spread; the rest is that of the first."""
-    found = dict(runs[0])
-    for name in [name for name in found if f"{name}_se" in found] if len(runs) > 1 else []:
-        values = [each[name] for each in runs]
-        if None not in values and not isinstance(values[0], list):
-            found |= {name: float(np.mean(values)), f"{name}_se": float(np.std(values, ddof=1) / math.sqrt(len(runs)))}
-    return found
 
 
 def light_references(

@@ -105,8 +105,8 @@ const tellTimes = (said) => {
   }
 };
 
-const percent = (share) => `${(100 * share).toPrecision(3)} %`;
-const small = (share) => `${(100 * share).toExponential(1)} %`;
+const percent = (fraction) => `${(100 * fraction).toPrecision(3)} %`;
+const small = (fraction) => `${(100 * fraction).toExponential(1)} %`;
 hear.error = ({failure, error, done, frames, mean}) => {
   const words = $("#error");
   document.documentElement.dataset.reference = failure ? "failed" : done ? "done" : error ? "known" : "none";
@@ -164,8 +164,8 @@ const pan = (across, upward) => {
   camera.target = add(camera.target, shift);
   aimed();
 };
-const dolly = (share) => {
-  const arm = times(add(camera.origin, camera.target, -1), Math.exp(share));
+const dolly = (fraction) => {
+  const arm = times(add(camera.origin, camera.target, -1), Math.exp(fraction));
   if (length(arm) > 1e-3) camera.origin = add(camera.target, arm);
   aimed();
 };
@@ -239,9 +239,9 @@ const step = (now) => {
 
 // How the pictures lie --------------------------------------------------------------------------------------------
 
-const setWipe = (share) => {
-  $("#wipe").value = share;
-  stage.style.setProperty("--wipe", `${Math.min(Math.max(share, 0), 100)}%`);
+const setWipe = (fraction) => {
+  $("#wipe").value = fraction;
+  stage.style.setProperty("--wipe", `${Math.min(Math.max(fraction, 0), 100)}%`);
 };
 const arrange = () => {
   const beside = $("#beside").value, layout = beside === "none" ? "one" : $("#layout").value;
@@ -280,8 +280,8 @@ const slider = (value, [least, most, decades], whole, moved) => {
   const input = make("input", {type: "range", min: 0, max: 1, step: "any", value: place(value), tabIndex: -1});
   input.setAttribute("aria-hidden", "true");  // the number beside it says the same
   input.addEventListener("input", () => {
-    const share = input.valueAsNumber;
-    let chosen = decades ? least * (most / least) ** share : least + share * (most - least);
+    const fraction = input.valueAsNumber;
+    let chosen = decades ? least * (most / least) ** fraction : least + fraction * (most - least);
     chosen = whole ? Math.round(chosen) : Number(chosen.toPrecision(3));
     moved(Math.min(Math.max(chosen, least), most));
   });
@@ -377,7 +377,7 @@ hear.state = (said) => {
   tellCommand();
   document.documentElement.dataset.told = String(Number(document.documentElement.dataset.told ?? 0) + 1);
 };
-// A camera as it was read has a target one metre away: the mouse turns about one that lies as far as the lamp.
+// A camera as it was read has a target one metre away: the mouse turns about one that lies as far as the light.
 const takeCamera = (there, aims) => {
   const own = camera.started && length(add(camera.origin, there["camera.origin"], -1)) < 1e-4 * (1 + length(camera.origin));
   camera.origin = there["camera.origin"];

@@ -74,13 +74,13 @@ def test_integrals_of_a_file_take_a_phase_function_by_words(variant, capfd, tmp_
     from validation.kernels.case_files import integrate_cases
 
     rays, written = tmp_path / "rays.csv", tmp_path / "results.csv"
-    rays.write_text("t,h,x0,x1,sigma_t,value\n1,0.5,0,3,0.2,7\n-1,0.25,0.5,inf,0.1,7\n")
-    assert cli.run(["study", "integrals", str(rays), "--phase", "hg-draine:12", "-o", str(written)]) == 0
+    rays.write_text("phase,t,h,x0,x1,sigma_t\nhg-draine:12,1,0.5,0,3,0.2\nhg-draine:12,-1,0.25,0.5,inf,0.1\n")
+    assert cli.run(["study", "integrals", str(rays), "-o", str(written)]) == 0
     assert "wrote" in capfd.readouterr().out
     with written.open() as file:
         results = list(csv.DictReader(file))
     assert {row["phase"] for row in results} == {"hg-draine:12"}
-    expected, _ = integrate_cases(read_cases(rays, phase="hg-draine:12"))
+    expected, _ = integrate_cases(read_cases(rays))
     assert [float(row["result"]) for row in results] == pytest.approx(expected, rel=1e-5)
 
 

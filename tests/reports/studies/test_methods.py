@@ -66,7 +66,7 @@ def test_errors_by_cause_are_printed_and_drawn(variant, capfd, tmp_path):
     (scene,) = printed(capfd, *arguments, "--size", "16x12", "-o", str(tmp_path / "parts.png"))["scenes"]
     (entry,) = scene["methods"]
     assert (scene["size"], entry["parameters"]) == ([16, 12], {"slices": 9, "width": 8})
-    assert sum(part["share"] for part in entry["parts"]) == pytest.approx(1, abs=1e-9)
+    assert sum(part["fraction"] for part in entry["parts"]) == pytest.approx(1, abs=1e-9)
     assert sum(part["relative_bias"] for part in entry["parts"]) == pytest.approx(entry["whole"]["relative_bias"], 1e-5)
     assert (tmp_path / "parts.png").stat().st_size > 10_000
 

@@ -23,7 +23,7 @@ def test_share_of_the_scenes_and_its_interval(sweep_of):
     several = [row(f"random:{n}", relative_rmse=2e-3 if n < 8 else 5e-4) for n in range(1000)]
     (sample,) = samples(sweep_of(several))
     made = claim(sample, 1e-3)
-    assert (made.tries, made.within, made.undecided, made.share) == (1000, 992, 0, 0.992)
+    assert (made.tries, made.within, made.undecided, made.fraction) == (1000, 992, 0, 0.992)
     assert (made.low, made.high) == binomial_interval(992, 1000)
     assert made.text == "ray-march: within 1e-3 in 99.2 % of 1000 scenes, 98.4 to 99.7 %."
 

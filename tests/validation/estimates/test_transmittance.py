@@ -70,8 +70,8 @@ def test_a_naive_march_is_too_bright_as_jensen_says(variant, tmp_path):
     path.write_text(grid_xml(volume(tmp_path / "smoke.vol", ROUGH**3), LAMP))
     errors = transmittance_errors(read_reference(load_scene(str(path)).scene), (2, 4))
     for each in errors:
-        if each["estimator"] == "naive":
-            assert each["bias"] == pytest.approx(each["jensen"], rel=0.25, abs=4 * each["bias_error"])
-            assert each["bias"] > 4 * each["bias_error"]
-        elif each["estimator"] != "jackknife":
-            assert abs(each["bias"]) < 4 * each["bias_error"]
+        if each.estimator == "naive":
+            assert each.bias == pytest.approx(each.jensen, rel=0.25, abs=4 * each.bias_error)
+            assert each.bias > 4 * each.bias_error
+        elif each.estimator != "jackknife":
+            assert abs(each.bias) < 4 * each.bias_error

@@ -209,7 +209,7 @@ def test_small_tables_have_every_figure_that_claims_ask_for(variant, monkeypatch
 
 @pytest.fixture(scope="module")
 def accuracies(variant):
-    return {(a["phase"], a["region"], a["kernel"]): a for a in printed_against_derived(2048)}
+    return {(a.phase, a.region, a.kernel): a for a in printed_against_derived(2048)}
 
 
 @pytest.mark.parametrize("phase", ["isotropic", "rayleigh", "hazy", "murky"])
@@ -218,9 +218,9 @@ def test_the_print_costs_accuracy_near_the_foot(accuracies, phase):
     within 1 % for isotropic, 48 % against 60 %, 3 % against 32 %, 26 % against 52 %.
     """
     printed, derived, exact = (accuracies[phase, "near-foot", name] for name in ("taylor-printed", "taylor", "exact"))
-    assert printed["within_1_percent"] < derived["within_1_percent"] - 0.05
-    assert printed["within_10_percent"] < derived["within_10_percent"]
-    assert exact["within_1_percent"] == 1
+    assert printed.within_1_percent < derived.within_1_percent - 0.05
+    assert printed.within_10_percent < derived.within_10_percent
+    assert exact.within_1_percent == 1
 
 
 def test_values_that_are_not_finite_count_as_wrong(variant):
@@ -228,6 +228,6 @@ def test_values_that_are_not_finite_count_as_wrong(variant):
         return 0 * geometry.foot / 0
 
     assert np.all(np.isinf(relative_errors(wide_rays(16), broken)))
-    tried = [each for each in printed_against_derived(64, kernels={"broken": broken}) if each["rays"]]
+    tried = [each for each in printed_against_derived(64, kernels={"broken": broken}) if each.rays]
     assert len(tried) >= 8
-    assert all(each["within_10_percent"] == 0 for each in tried)
+    assert all(each.within_10_percent == 0 for each in tried)

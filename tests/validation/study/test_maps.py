@@ -60,8 +60,8 @@ def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
     sizes = (32, 64, 128, 256)
     turn = round(2 * np.pi / 2e-3)  # so that a shadow moves by 0.03 to 0.26 texels a frame
     found = method_motion(scene, Animation(), marches(*sizes), frames=17, turn=turn)
-    assert fitted_exponent(sizes, [row["flicker"] for row in found])[0] == pytest.approx(-0.5, abs=0.2)
-    assert all(row["nonfinite"] == 0 for row in found)
+    assert fitted_exponent(sizes, [row.measures.flicker.value for row in found])[0] == pytest.approx(-0.5, abs=0.2)
+    assert all(row.measures.nonfinite == 0 for row in found)
 
 
 def split(method, kernel=None, *, size=(24, 20), render=None, **parameters):
@@ -74,7 +74,7 @@ def split(method, kernel=None, *, size=(24, 20), render=None, **parameters):
 
 
 def causes(parts):
-    return [(part["cause"], part["without"]) for part, _ in parts[1:]]
+    return [(part.cause, part.without) for part in parts[1:]]
 
 
 @pytest.mark.claim("error-by-cause", tolerance="1e-6 of the mean of the reference, pixel by pixel")
@@ -95,11 +95,11 @@ def causes(parts):
     ],
 )
 def test_the_parts_add_up_to_the_whole(variant, method, kernel, parameters):
-    (whole, error), *parts = split(method, kernel, **parameters)
-    mean = error.mean() / whole["relative_bias"]  # of the reference
-    np.testing.assert_allclose(np.sum([image for _, image in parts], axis=0), error, atol=1e-6 * mean)
-    assert sum(part["share"] for part, _ in parts) == pytest.approx(1, abs=1e-9)
-    assert whole["relative_rmse"] > 1e-4
+    whole, *parts = split(method, kernel, **parameters)
+    mean = whole.image.mean() / whole.relative_bias  # of the reference
+    np.testing.assert_allclose(np.sum([part.image for part in parts], axis=0), whole.image, atol=1e-6 * mean)
+    assert sum(part.fraction for part in parts) == pytest.approx(1, abs=1e-9)
+    assert whole.relative_rmse > 1e-4
 
 
 def test_a_cause_that_is_gone_takes_its_part_along(variant):
@@ -107,8 +107,8 @@ def test_a_cause_that_is_gone_takes_its_part_along(variant):
     better = split("ray-march", steps=9)
     assert causes(coarse) == [("map", "shadow=ray"), ("steps", "reference")]
     assert causes(better) == [("steps", "reference")]
-    np.testing.assert_array_equal(coarse[2][1], better[1][1])
-    np.testing.assert_allclose(coarse[1][1], coarse[0][1] - better[0][1], atol=1e-15)
+    np.testing.assert_array_equal(coarse[2].image, better[1].image)
+    np.testing.assert_allclose(coarse[1].image, coarse[0].image - better[0].image, atol=1e-15)
 
 
 def test_a_method_of_ones_own_is_rendered_by_its_caller(variant):

@@ -18,12 +18,12 @@ def test_a_history_lags_by_its_weight_and_planes_do_not(variant):
     before = np.array(loaded.scene.emitters()[0].world_transform().matrix)
     averaged = Configuration("unshadowed+history", "exact", (("alpha", 0.1),))
     rows = method_motion(loaded.scene, loaded.animation, [USUAL[0], averaged], frames=16, turn=240)
-    planes, late = rows
-    assert planes["relative_rmse"] < 1e-5  # float32 beside the light
-    assert abs(planes["lag"]) < 1e-4
-    assert late["lag"] == pytest.approx(9, abs=0.01)
-    assert late["persistence"] > 4 * late["persistence_se"]
-    assert late["flicker_beside_lag"] < late["flicker"]
+    planes, late = (row.measures for row in rows)
+    assert planes.relative_rmse.value < 1e-5  # float32 beside the light
+    assert abs(planes.lag.lag.value) < 1e-4
+    assert late.lag.lag.value == pytest.approx(9, abs=0.01)
+    assert late.lag.persistence.above(4)
+    assert late.flicker_beside_lag.value < late.flicker.value
     np.testing.assert_array_equal(np.array(loaded.scene.emitters()[0].world_transform().matrix), before)
 
 
@@ -31,8 +31,9 @@ def test_a_noisy_march_with_history_is_measured_in_several_runs(variant):
     loaded = load_scene("open-fog", (32, 24))
     (row,) = method_motion(loaded.scene, loaded.animation, [USUAL[3]], frames=16, turn=240, runs=3)
     # Of 0.1 for the newest frame 9 frames are expected; errors are those of three runs, Student's 2 degrees.
-    assert abs(row["lag"] - 9) < 0.5 + 10 * row["lag_se"]
-    assert 0 < row["bias_se"] < row["relative_rmse"]
+    lag, bias = row.measures.lag.lag, row.measures.bias
+    assert abs(lag.value - 9) < 0.5 + 10 * lag.error
+    assert 0 < bias.error < row.measures.relative_rmse.value
 
 
 def test_what_does_not_move_is_refused(variant):
