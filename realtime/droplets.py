@@ -48,8 +48,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
-from scipy.special import gammainccinv, gammaincinv
 
 from realtime.errors import InputError
 
@@ -99,6 +97,9 @@ def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 
 
     Takes some seconds at 6 um, a minute at 50 um; the results are kept.
     """
+    from scipy.fft import dct
+    from scipy.special import gammainccinv, gammaincinv
+
     _check(radius, gamma, wavelength)
     count = round(_SIZES * min(1.0, max(0.25, _REFERENCE_RADIUS / radius)))
     low, high = gammaincinv(gamma + 2, _TAIL), gammainccinv(gamma + 2, _TAIL)

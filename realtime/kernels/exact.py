@@ -18,8 +18,8 @@ foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"),
 their width.
 
 Every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, in float32 four or
-eight nodes in x if it is short; they leave less than 1e-6. In float64 the same panels have 24 nodes: three times as
-many leave the third power of that.
+eight nodes in x if it is short; they leave less than 1e-6. In float64 the panels have 22 nodes, which leave that to
+the power of 22/8, 1e-16, and hold more depth: by the bound below 22 nodes leave 1e-20 of T = 24.
 
 **Panels** of Gauss-Legendre nodes: every ray takes as many as its segment needs. The integral in v is
 
@@ -167,7 +167,7 @@ def _half_angle(s, r, inverse, height_squared):
     return dr.select(behind, large, small), dr.select(behind, small, large)
 
 
-_NODES_DOUBLE = 24  # of a panel in float64
+_NODES_DOUBLE, _DEPTH_DOUBLE = 22, 24.0  # of a panel in float64
 MOST_PANELS = 160  #: no segment needs as many, but a loop over values that are not numbers must end too
 _SOFT = 0.85  #: w for a light whose intensity falls off
 _NO_RATE = 1e-30
@@ -175,20 +175,29 @@ DEEPEST = 116.0  #: power of 2 beyond which nothing is left: e^-80
 
 
 def panels_mean(
-    phase: Phase, start, scale, width, decays, weight: Callable[[Any], Any] | None, *, nodes: int = PANEL_NODES
+    phase: Phase,
+    start,
+    scale,
+    width,
+    decays,
+    weight: Callable[[Any], Any] | None,
+    *,
+    nodes: int = PANEL_NODES,
+    most: float = PANEL_DEPTH,
 ):
     """Return I/(d (v1 - v0)), the mean over the range of v, for each extinction [1].
 
     `phase`: the phase function; `start`: (F, C), sinh and cosh of v0; `scale`: d, see above; `width`: v1 - v0;
     0 where there is nothing to integrate; `decays`: a = sigma_t h, one or more; `weight`: relative intensity of the
-    light by E, or None where it is 1 everywhere; `nodes`: of a panel.
+    light by E, or None where it is 1 everywhere; `nodes`, `most`: of a panel,
+    and T1.
 
     Valid for any decay. The values are 0 where e^-80 is.
     """
     Float = type(width)
     f, c = start
     largest = reduce(dr.maximum, decays)
-    count = panel_count(phase, width, largest * scale * c * width, soft=weight is not None)
+    count = panel_count(phase, width, largest * scale * c * width / most, soft=weight is not None)
     part_of_all = dr.rcp(dr.maximum(Float(count), 1))
     part = width * part_of_all
     offsets = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(nodes)]
@@ -223,22 +232,26 @@ def _kept(depth):
     return exp2_bounded(dr.maximum(depth, -DEEPEST))
 
 
-def panel_count(phase: Phase, width, depth, *, soft: bool = False):
-    """Return the number of panels m of segments of some width in v [1], and depth T [1]; 0 where the width is 0."""
+def panel_count(phase: Phase, width, depths, *, soft: bool = False):
+    """Return the number of panels m of segments of some width in v, and T/T1 [1]; 0 where the width is 0."""
     Float = type(width)
     widest = phase.panel_width(Float)
     if soft:
         widest = dr.minimum(widest, _SOFT)
-    count = dr.maximum(width / widest, depth * (1 / PANEL_DEPTH))
+    count = dr.maximum(width / widest, depths)
     # As whole numbers: a minimum of floats lets through what is no number, as 2^32 - 1 panels.
     return dr.select(width > 0, dr.minimum(mi.UInt32(dr.ceil(count)), MOST_PANELS), 0)
 
 
 def _offset(u):
     """Return sinh u and cosh u - 1."""
-    half = sinh_bounded(0.5 * u) if is_single(type(u)) else dr.sinh(0.5 * u)
-    double = 2 * half
-    return double * dr.sqrt(dr.fma(half, half, 1)), double * half
+    if is_single(type(u)):
+        half = sinh_bounded(0.5 * u)
+        double = 2 * half
+        return double * dr.sqrt(dr.fma(half, half, 1)), double * half
+    grown = dr.exp(u)  # what cancels where u is small moves a node by a rounding error
+    shrunk = dr.rcp(grown)
+    return 0.5 * (grown - shrunk), 0.5 * (grown + shrunk) - 1
 
 
 def exact(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light):
@@ -338,8 +351,9 @@ def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light:
         return geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e)))
 
     decays = [sigma_t * h for sigma_t in extinctions]
-    nodes = PANEL_NODES if is_single(Float) else _NODES_DOUBLE
-    means = panels_mean(phase, (f0, c0), scale, width, decays, weight if light.varies else None, nodes=nodes)
+    nodes, most = (PANEL_NODES, PANEL_DEPTH) if is_single(Float) else (_NODES_DOUBLE, _DEPTH_DOUBLE)
+    shape = weight if light.varies else None
+    means = panels_mean(phase, (f0, c0), scale, width, decays, shape, nodes=nodes, most=most)
     r0 = dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h))
     shared = (width * scale) * (2 / h)
     return [mean * shared * dr.exp(-sigma_t * (x0 + r0)) for mean, sigma_t in zip(means, extinctions)]

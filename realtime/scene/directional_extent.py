@@ -17,7 +17,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from realtime.numerics.array_types import ArrayTypes, aligned_array
 from realtime.scene.closed_mesh import ClosedMesh
@@ -44,6 +43,8 @@ def media_spheres(bounded_media: tuple[BoundedMedium, ...]) -> Array:
 
 def mesh_spheres(meshes: Sequence[ClosedMesh]) -> Array:
     """Return spheres whose hull holds meshes, as `media_spheres` does: the corners of their convex hull."""
+    from scipy.spatial import ConvexHull
+
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     corners = vertices[ConvexHull(vertices).vertices]
     return _rounded(np.column_stack([corners, np.zeros(len(corners))]))

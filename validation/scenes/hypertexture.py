@@ -15,8 +15,6 @@ t^5 - 15 t^4 + 10 t^3. It is continuous with its first two derivatives, 0 at the
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
-from scipy.spatial import cKDTree
 
 from validation.scenes.meshes import Mesh
 
@@ -37,6 +35,8 @@ def hypertexture(
     four octaves of noise there are the size of the first's `cells`, the largest value, `amplitude` [m], and the `seed`;
     without noise the density rises from 0 to 1 between two `depths` [m].
     """
+    from scipy.ndimage import map_coordinates
+
     low, high = mesh[0].min(axis=0) - margin, mesh[0].max(axis=0) + margin
     coarse = voxels // 2
     sparse = grid_points(low, high, (coarse,) * 3)
@@ -131,6 +131,8 @@ def distance_into(mesh: Mesh, points: Array) -> Array:
 
     It is that of the nearest of points on the mesh, `SAMPLING` apart at most: 0.5 m too long at a depth of 40 m.
     """
+    from scipy.spatial import cKDTree
+
     vertices, faces = mesh
     corners = vertices[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)

@@ -23,7 +23,6 @@ from typing import Any
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.coordinates import SETS
@@ -195,6 +194,8 @@ def _fit_thickness(
     samples: _Samples, number: int, p: Array, start: tuple[Array, Array] | None
 ) -> tuple[Array, Array, Array]:
     """Fit one thickness, all directions and suns together; return the functions and the modelled T."""
+    from scipy.optimize import least_squares
+
     t, T = float(samples.t[number].flat[0]), samples.T[number]
     d, mu_l = samples.d[number, :, 0, 0, 0], samples.mu_l[number, 0, :, 0, 0]
     scale = T + _floor(samples)[number]
@@ -246,6 +247,8 @@ def _fit_collector(samples: _Samples) -> tuple[Array, Array]:
 
 def _fit_direction(samples: _Samples, number: int) -> tuple[Array, Array]:
     """Return E to M of one direction, and N by sun."""
+    from scipy.optimize import least_squares
+
     part = (slice(None), slice(None), slice(None), number)
     seen = samples.share[part] > _DIM
     if seen.sum() < 40:
@@ -275,6 +278,8 @@ def _collector(x: Array, n: Array, d: Array, phi: Array, phi_l: Array) -> tuple[
 
 def _fit_spread(samples: _Samples) -> Array:
     """Return O, Q, R, S, T."""
+    from scipy.optimize import least_squares
+
     seen = samples.share > _DIM
     t, d, sigma = (each[seen][::3] for each in (samples.t, samples.d, samples.sigma))
 

@@ -37,7 +37,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.coordinates import ENTRIES, SETS, around, at_angle, place_shares, repeated_scattering
@@ -193,6 +192,8 @@ def _entries(slabs: DirectionalMoments, angular: Array, t: float) -> tuple[Array
 
 def _finer_sources(number: int, level: Array) -> Array:
     """Return log Q_0 of a set at the entries of frames, of what is left of it without r where it is computed."""
+    from scipy.interpolate import make_interp_spline
+
     finer = _filled(level[..., None])[..., 0]
     for axis, times in enumerate(FINER):
         count = finer.shape[axis]

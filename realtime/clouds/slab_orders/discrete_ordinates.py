@@ -47,7 +47,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
 
 from realtime.clouds.slab_orders.depth_panels import Transport
 
@@ -113,6 +112,8 @@ class Eigenmodes:
     """
 
     def __init__(self, streams: Streams, m: int, *, albedo: float, moments: Array, peak: float):
+        from scipy.linalg import cholesky, solve_triangular
+
         half = streams.mu.size // 2
         mu, weights = streams.mu[:half], streams.weights[:half]
         albedo = min(albedo, LARGEST_ALBEDO)

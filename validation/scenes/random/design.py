@@ -21,7 +21,6 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from analytic.errors import InputError
 from validation.readers import Reader, read_named, read_number, read_table, read_toml
@@ -100,6 +99,8 @@ class Draws:
 @lru_cache(maxsize=64)
 def point(seed: int) -> Mapping[str, float]:
     """Return the coordinates of a seed by name, each within (0, 1)."""
+    from scipy.stats import qmc
+
     if not 0 <= seed <= LARGEST_SEED:
         raise InputError(f"random scene: got the seed {seed}, wanted a whole number from 0 to {LARGEST_SEED}")
     sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=np.random.default_rng(_SCRAMBLING))
