@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Make the column `value` of `airlight_integral.csv` and `airlight_integral_rays.csv`, with proof.
-
-    python -m tests.evidence.certified.airlight_integral            # computes all 3006 values, compares with the files
-    python -m tests.evidence.certified.airlight_integral --write    # writes them
+"""The column `value` of `airlight_integral.csv` and `airlight_integral_rays.csv`, with proof.
 
 Every value is enclosed by ball arithmetic (Arb in FLINT, through python-flint; Johansson, "Numerical integration in
 arbitrary-precision ball arithmetic", ICMS 2018): each operation returns an interval that holds the exact result, and
 `acb.integral` bounds the error of its quadrature by the integrand's size on ellipses in the complex plane. A value is
-written only where both ends of its enclosure round to the same 20 digits. Nothing of this project is imported: phase
+given only where both ends of its enclosure round to the same 20 digits. Nothing of this project is imported: phase
 functions, geometry and change of variables are written here once more.
 
 The inputs are the other columns, and count as exact. The binary numbers in the files are those of single precision,
@@ -47,8 +44,6 @@ length other than 1 is divided out: foot = (v . d)/|d| and h = |v x d|/|d|, in b
 """
 
 import csv
-import io
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -149,30 +144,3 @@ def _word(number: arb, count: int) -> str:
     mantissa, exponent = (int(part) for part in number.man_exp())
     with mp.workprec(8 * PRECISION):
         return str(mp.nstr(mp.ldexp(mp.mpf(mantissa), exponent), count))
-
-
-def main() -> int:
-    """Compute the values of both files; compare them with those that stand there, or write them with `--write`."""
-    differing = 0
-    for name in FILES:
-        path = FOLDER / name
-        header, rows = read(path)
-        for line, row in enumerate(rows, start=2):
-            computed = value(row)
-            if computed != row["value"]:
-                differing += 1
-                print(f"{name}, line {line}: the file says {row['value']}, the enclosure {computed}")
-            row["value"] = computed
-        if "--write" in sys.argv[1:]:
-            text = io.StringIO()
-            writer = csv.DictWriter(text, header, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-            path.write_text(text.getvalue())
-        print(f"{name}: {len(rows)} rows")
-    print(f"{differing} values differ from the files")
-    return 1 if differing else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
