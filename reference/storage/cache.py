@@ -101,9 +101,10 @@ def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
     buffer = BytesIO()
     np.savez(buffer, **(content | {_DIGEST: np.asarray(_content_digest(key, content))}))
     try:
-        write_bytes(_path(key), buffer.getvalue())
+        # Not flushed, which takes half the time of a small file: one that a loss of power damages counts as missing.
+        write_bytes(_path(key), buffer.getvalue(), flush=False)
     except FileNotFoundError:  # the folder was empty, and another process has just removed it
-        write_bytes(_path(key), buffer.getvalue())
+        write_bytes(_path(key), buffer.getvalue(), flush=False)
     _written += len(buffer.getvalue())
     if _written > limit / 100:
         _written = 0
@@ -118,6 +119,15 @@ def is_stored(key: str) -> bool:
 def drop_arrays(key: str) -> None:
     """Remove the file of a key."""
     _path(key).unlink(missing_ok=True)
+
+
+def drop_parts(key: str) -> None:
+    """Remove the files of the keys inside a key."""
+    folder = _path(key).with_suffix("")
+    for path in _listed(folder):
+        path.unlink(missing_ok=True)
+    with suppress(OSError):  # there was none, or another process works in it
+        folder.rmdir()
 
 
 def cache_entries() -> list[Entry]:

@@ -75,7 +75,7 @@ def ensure_writable(path: str | os.PathLike[str]) -> Path:
 
 
 @contextmanager
-def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_path(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator[Path]:
     r"""Give the name of a temporary file that becomes `path` when the block ends without an exception.
 
     The temporary file lies in the same folder, so that the move is one step, and has the same suffix, so that a writer
@@ -86,6 +86,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     ----------
     path
         The file to write; its folder is made if needed.
+    flush
+        Wait for the disk, so that the file is whole after a loss of power too.
 
     Yields
     ------
@@ -110,7 +112,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = target.with_name(f".{target.stem[:100]}-{uuid.uuid4().hex}{target.suffix}")
     try:
         yield temporary
-        _flush(temporary)
+        if flush:
+            _flush(temporary)
         os.replace(temporary, target)
     except BaseException as error:
         with suppress(OSError):
@@ -151,9 +154,9 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file, whole or not at all."""
-    with atomic_path(path) as temporary:
+def write_bytes(path: str | os.PathLike[str], data: bytes, *, flush: bool = True) -> None:
+    """Write a file, whole or not at all; `flush` as of `atomic_path`."""
+    with atomic_path(path, flush=flush) as temporary:
         temporary.write_bytes(data)
 
 

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Results that are kept between runs: references, batches, rays, parts of reports, rows of sweeps.
+"""Results that are kept between runs: references, batches, rays, parts of reports.
 
-One rule names them all. The key of a result is a digest of
+`kept` is a decorator: a function that has it is computed once. The key of a result is a digest of
 
-* the arguments of the function that computes it,
-* the source code of that function's module and of all modules of ours that this imports, directly or not,
+* the arguments of the function, but not of those that can only be given by name: they say how, not what
+  (a progress, a process, what was loaded before);
+* the source code of that function's module and of all modules of ours that this imports, directly or not;
 * the versions of Mitsuba, Dr.Jit, NumPy and SciPy.
 
 Source code counts as Python compiles it, without comments, docstrings and line numbers: rewording one throws nothing
 away. What a result took is the time to compute it from nothing: when a result is loaded, the time that it once took is
 added to that of the result which is being computed from it.
+
+A value is made of numbers, words, arrays, lists, dictionaries and data classes of these, as its function's annotation
+says. Work that goes on where it was stopped keeps its parts by `store` and `load` under keys inside that of the whole:
+batches of a Monte Carlo estimator, of which eight become one file of a quarter the size, and images of area lights.
+Rows of a study lie in one database by the same keys (`validation/study/rows.py`): a study may have millions.
 """
 
 import hashlib
@@ -19,24 +25,30 @@ import marshal
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, is_dataclass
-from functools import lru_cache, partial
+from functools import lru_cache, partial, update_wrapper
 from pathlib import Path
 from types import CodeType
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
+import msgspec
 import numpy as np
 
-from reference.storage.cache import is_stored, load_arrays, store_arrays
+from reference.storage.cache import drop_parts, is_stored, load_arrays, store_arrays
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("analytic", "realtime", "reference", "validation", "reports")
 _VERSIONS = ("mitsuba", "drjit", "numpy", "scipy")
+_ONLY_BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _FRESH = "AIRLIGHT_FRESH"  # results that are older count as missing [s since 1970]; child processes inherit it
 _ABOUT = ("seconds", "processor", "made")  # what is stored beside the arrays of a result
+_DATA, _ARRAY = "data", "array number"  # the array of the JSON of a value, and what stands there for an array
 _loaded = [0.0, 0.0]  # what the results took that this process has loaded, as `Spent`
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class Spent(NamedTuple):
@@ -47,37 +59,119 @@ class Spent(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Kept:
+class Kept(Generic[T]):
     """A result, and what it took to compute it from nothing."""
 
-    arrays: Mapping[str, Any]
+    value: T
     spent: Spent
     made: float  #: when [s since 1970]
     loaded: bool  #: whether it was kept already
+
+    @property
+    def seconds(self) -> float:
+        """What it took [s]."""
+        return round(self.spent.seconds, 3)
+
+    @property
+    def measured(self) -> str:
+        """Date and time of the computation."""
+        return date(self.made)
+
+
+class KeptFunction(Generic[P, T]):
+    """A function whose results are kept, as `kept` makes it."""
+
+    def __init__(self, function: Callable[P, T], kind: str, code: Sequence[Any], worth: Callable[[T], bool]) -> None:
+        update_wrapper(self, function)
+        self._function, self._kind, self._code, self._worth = function, kind, code or (function,), worth
+        self._signature, self._type = inspect.signature(function), function.__annotations__["return"]
+
+    def __call__(self, *given: P.args, **others: P.kwargs) -> T:
+        """Return the value."""
+        return self.result(*given, **others).value
+
+    def result(self, *given: P.args, **others: P.kwargs) -> Kept[T]:
+        """Return the value, and what it took, from the disk or computed now."""
+        key = self.key(*given, **others)
+        found = load(key)
+        if found is not None:
+            return self._result(found)
+        spent = stopwatch()
+        return self._store(key, self._function(*given, **others), spent())
+
+    def keep(self, value: T, spent: Spent, *given: Any, **others: Any) -> None:
+        """Keep a value that another process computed, and what it took, for this one to find."""
+        self._store(self.key(*given, **others), value, spent)
+
+    def is_kept(self, *given: Any, **others: Any) -> bool:
+        """Return whether the value is kept already."""
+        return is_kept(self.key(*given, **others))
+
+    def key(self, *given: Any, **others: Any) -> str:
+        """Return the key of the value; what decides nothing may be missing."""
+        bound = self._signature.bind_partial(*given, **others)
+        bound.apply_defaults()
+        kinds = self._signature.parameters
+        decides = {name: each for name, each in bound.arguments.items() if kinds[name].kind != _ONLY_BY_NAME}
+        return key_of(self._kind, *self._code, **decides)
+
+    def _store(self, key: str, value: T, spent: Spent) -> Kept[T]:
+        arrays = _packed(value)
+        kept = store(key, arrays, spent) if self._worth(value) else Kept(arrays, spent, time.time(), False)
+        drop_parts(key)
+        return self._result(kept)  # as it will come from the disk
+
+    def _result(self, kept: "Kept[dict[str, Any]]") -> Kept[T]:
+        return Kept(_unpacked(kept.value, self._type), kept.spent, kept.made, kept.loaded)
+
+
+def kept(
+    kind: str, *code: Any, worth: Callable[[Any], bool] = lambda value: True
+) -> Callable[[Callable[P, T]], KeptFunction[P, T]]:
+    """Return a decorator that keeps the values of a function.
+
+    `kind`: as for `key_of`; `code`: the functions or names of modules whose code decides the value, by default the
+    function itself; `worth`: says whether a value is kept.
+    """
+    return lambda function: KeptFunction(function, kind, code, worth)
+
+
+def _packed(value: Any) -> dict[str, Any]:
+    """Return a value as arrays, of which one is JSON."""
+    arrays: dict[str, Any] = {}
+
+    def plain(each: Any) -> Any:
+        if isinstance(each, np.generic):
+            return each.item()
+        if not isinstance(each, np.ndarray):
+            raise TypeError(f"{type(each)} cannot be kept")
+        arrays[str(len(arrays))] = each
+        return {_ARRAY: str(len(arrays) - 1)}
+
+    text = json.dumps(msgspec.to_builtins(value, str_keys=True, enc_hook=plain))
+    return {**arrays, _DATA: np.frombuffer(text.encode(), dtype=np.uint8)}
+
+
+def _unpacked(arrays: Mapping[str, Any], kind: Any) -> Any:
+    """Return the value of a type that was packed."""
+    text = np.asarray(arrays[_DATA]).tobytes()
+    tree = json.loads(text, object_hook=lambda each: arrays[each[_ARRAY]] if each.keys() == {_ARRAY} else each)
+    return msgspec.convert(tree, kind, dec_hook=lambda _, each: each)
 
 
 def key_of(kind: str, /, *functions: Any, **arguments: Any) -> str:
     """Return the key under which a result is kept.
 
     `kind`: one or more words with dashes: a file name begins with it; `functions`: the functions that compute it, or
-    names of modules of ours; `arguments`: what the result depends on besides: numbers, words, arrays, paths, and
-    tuples, dictionaries and data classes of these.
+    names of modules of ours; `arguments`: what the result depends on besides: numbers, words, arrays, paths, Mitsuba
+    scenes, and tuples, dictionaries and data classes of these.
     """
     content = {"arguments": arguments, "code": source_digest(*functions)}
     return f"{kind}-{hashlib.sha256(json.dumps(content, sort_keys=True, default=_plain).encode()).hexdigest()[:32]}"
 
 
-def kept(key: str, compute: Callable[[], Mapping[str, Any]]) -> Kept:
-    """Return the result of a key, or compute and keep it."""
-    result = load(key)
-    if result is not None:
-        return result
-    spent = stopwatch()
-    return store(key, compute(), spent())
-
-
-def load(key: str) -> Kept | None:
-    """Return the result of a key; None if it is missing, damaged or, in a fresh run, older than the run."""
+def load(key: str) -> Kept[dict[str, Any]] | None:
+    """Return the arrays of a key; None if it is missing, damaged or, in a fresh run, older than the run."""
     loading = stopwatch()
     arrays = load_arrays(key) if is_kept(key) else None
     if arrays is None:
@@ -88,11 +182,11 @@ def load(key: str) -> Kept | None:
     return Kept(arrays, Spent(seconds, processor), made, True)
 
 
-def store(key: str, arrays: Mapping[str, Any], spent: Spent) -> Kept:
-    """Keep a result, and what it took."""
+def store(key: str, arrays: Mapping[str, Any], spent: Spent) -> Kept[dict[str, Any]]:
+    """Keep arrays, and what they took."""
     made = time.time()
     store_arrays(key, {**arrays, **dict(zip(_ABOUT, (*spent, made)))})
-    return Kept(arrays, spent, made, False)
+    return Kept(dict(arrays), spent, made, False)
 
 
 def is_kept(key: str) -> bool:
@@ -125,6 +219,11 @@ def fresh_results(since: float | None) -> Iterator[None]:
 def fresh_since() -> float | None:
     """Return since when results count in this block, None for always."""
     return float(os.environ[_FRESH]) if _FRESH in os.environ else None
+
+
+def date(seconds: float | None = None) -> str:
+    """Return date and time, now by default, as YYYY-MM-DD HH:MM:SS with the time zone."""
+    return time.strftime("%Y-%m-%d %H:%M:%S %z", time.localtime(seconds))
 
 
 def stopwatch() -> Callable[[], Spent]:
@@ -248,4 +347,8 @@ def _plain(value: Any) -> Any:
         return value.item()
     if isinstance(value, Mapping):
         return dict(value)
+    if type(value).__module__ == "mitsuba" and type(value).__name__ == "Scene":
+        from reference.storage.scene_digest import scene_digest  # imports Mitsuba
+
+        return scene_digest(value)
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else str(value)

@@ -378,7 +378,7 @@ class PaperClaims(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight paper --json` prints."""
-        from validation.study.results import date
+        from reference.storage.kept import date
 
         rows = [asdict(row) for row in self.rows]
         return {"measured": date(), "environment": self.environment, "papers": rows, "left_out": self.left_out}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from realtime.export.text import kernel_text
 from realtime.methods.shader.client import ShaderHost
 from realtime.scene.phase import named_phase
+from reference.storage.kept import kept
 from validation.certified.files import certified_data
 from validation.kernels.case_files import read_cases
 
@@ -43,6 +44,12 @@ def exported_values(host: ShaderHost, text: str, columns: Sequence[Any]) -> NDAr
         return np.full(len(stacked), math.nan)
     _, image = host.ask("frame", {"texture rows": given}, reset=True, frames=1, uniforms={})
     return np.asarray(image[0, :, 0], dtype=np.float64)
+
+
+@kept("shader-driver")
+def error_of_device(device: str, *, host: ShaderHost) -> float:
+    """Return the `driver_error` of the device of a host, by its name and version."""
+    return driver_error(host)[0]
 
 
 def driver_error(host: ShaderHost, kernel: str = "exact", phase: str = "hg") -> tuple[float, int]:

@@ -31,11 +31,9 @@ def opengl_status(*, judged: bool = True) -> OpenGl:
         if not judged:
             return OpenGl(True, device)
         from realtime.export.text import CONFORMING
-        from reference.storage.kept import kept, key_of
-        from reports.machine.driver_check import driver_error
+        from reports.machine.driver_check import error_of_device
 
-        key = key_of("shader-driver", "reports.machine.driver_check", device=device)
-        wrong = float(kept(key, lambda: {"error": driver_error(host)[0]}).arrays["error"])
+        wrong = error_of_device(device, host=host)
     except NoDriverError as error:
         return OpenGl(False, str(missing(str(error))))
     finally:

@@ -14,13 +14,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.methods.shader.source import is_shader
 from reference.storage.files import NO_SPACE, ensure_folder
-from reference.storage.kept import fresh_results
+from reference.storage.kept import Kept, date, fresh_results
 from reports.data.reader import report_text
 from reports.data.records import SCHEMA, Environment, Measured, Report, Settings
 from reports.machine.environment import describe_environment, machine, threads
@@ -32,16 +32,13 @@ from reports.report.claims import claims, growth_claims, own_fault, unstudied
 from reports.report.others import other_parts, paper_rows, spans_of
 from reports.report.scene import folder_of, write_scene
 from validation.columns import record_of
-from validation.kernels.records import Stability
 from validation.scenes.loading import scene_stem
 from validation.scenes.random.design import is_random
 from validation.scenes.registry import FOG_SCENES, SCENES
 from validation.study.configuration import Configuration
-from validation.study.results import Result, date
 from validation.study.run import PROBE, Apart, frame_of
 from validation.study.scene import SceneStudy, open_scene, study_scene
 from validation.study.study import STUDIES, Cell, Study, standard_study
-from validation.timing import Scaling
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Client
@@ -97,7 +94,7 @@ def write_report(
         of_scenes = [each.seconds() for each in studies]
         whole = [sum(each.values()) for each in of_scenes] + [part.seconds for part in others]
         spans = list(spans_of({str(n): each for n, each in enumerate([*whole, _PAGE_SECONDS * len(studies)])}).values())
-        studied, results = [], list[Result]()
+        studied, results = [], list[Kept[Any]]()
         with _timed(seconds, "scenes"):
             if cluster is not None:
                 from reports.cluster.references import bring_references
@@ -119,16 +116,16 @@ def write_report(
                 _raise_own_faults(result.rows, process)
                 results += result.results
                 studied.append(write_scene(result, hidden))
-        by_kind: dict[str, list[Result]] = {}
+        by_kind: dict[str, list[Any]] = {}
         for part, span in zip(others, spans[len(studies) :]):
             with _timed(seconds, part.kind):
                 found = part.result(part_of(progress, *span, before=f"{part.title}, "))
-            by_kind.setdefault(part.kind, []).append(found)
+            by_kind.setdefault(part.kind, []).append(found.value)
             results.append(found)
-        scaling = [record_of(each, Scaling) for found in by_kind.get("scaling", ()) for each in found.data["scaling"]]
+        scaling = [each for found in by_kind.get("scaling", ()) for each in found]
         usual = study.name in STUDIES and names == standard_study(study.name).scenes
-        kernels = [each for found in by_kind.get("stability", ()) for each in found.data["kernels"]]
-        kept, made = sum(result.cached for result in results), sorted(result.made for result in results)
+        kernels = [each for found in by_kind.get("stability", ()) for each in found]
+        kept, made = sum(result.loaded for result in results), sorted(result.made for result in results)
         report = Report(
             schema=SCHEMA,
             created=date(),
@@ -142,7 +139,7 @@ def write_report(
             environment=record_of(environment, Environment),
             claims=(*claims(studied), *growth_claims(scaling), *(unstudied(names, list(FOG_SCENES)) if usual else [])),
             scenes=tuple(studied),
-            stability=tuple(record_of(each, Stability) for each in kernels),
+            stability=tuple(kernels),
             scaling=tuple(scaling),
             papers=tuple(paper_rows(by_kind.get("papers", ()))),
         )

@@ -3,19 +3,21 @@
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
-from reference.storage.kept import is_kept, key_of
+from realtime.kernels.registry import KERNELS
+from realtime.methods.shader.source import is_users
+from reference.storage.kept import Kept, KeptFunction, kept, source_digest
 from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from validation.kernels.records import Stability
 from validation.papers.claims import EFFORTS, Claim, Judged, claims, experiments, judged
-from validation.study.results import Computed, Result, cached_result
+from validation.study.configuration import Configuration, user_code
 from validation.study.study import Study, standard_study
+from validation.timing import Scaling
 
 _STABILITY, _GROWTH = 20.0, 80.0  # that these take [s]
 _LEAST = 0.01  # to read a kept result [s]
@@ -27,30 +29,31 @@ class OtherPart:
 
     kind: str  #: 'stability', 'scaling' or 'papers'
     title: str  #: shown as the progress
-    key: str  #: of its result
     usual: float  #: roughly what it takes [s]
-    compute: Callable[[Progress], Computed]
+    function: KeptFunction[..., Any]
+    given: tuple[Any, ...]  #: what decides its result
 
     @property
     def seconds(self) -> float:
         """What it will take [s]."""
-        return 0.0 if is_kept(self.key) else self.usual
+        return 0.0 if self.function.is_kept(*self.given) else self.usual
 
-    def result(self, progress: Progress) -> Result:
+    def result(self, progress: Progress) -> Kept[Any]:
         """Return its result, kept or computed."""
-        return cached_result(self.key, partial(self.compute, progress))
+        return self.function.result(*self.given, progress=progress)
 
 
 def other_parts(study: Study) -> list[OtherPart]:
     """Return the parts that a study asks for; claims of papers only with all scenes of a study of ours."""
     parts = []
     if study.stability:
-        from validation.kernels.stability import stability
-
-        key = key_of("report-stability", stability, rays=study.stability)
-        parts.append(OtherPart("stability", "stability", key, _STABILITY, partial(_stability, study.stability)))
+        parts.append(OtherPart("stability", "stability", _STABILITY, _stability, (study.stability, _users_kernels())))
     if study.growth and set(standard_study("scaling").scenes) <= set(study.scenes):
-        parts += [_scaling(kind, study.measure.seconds) for kind in study.growth]
+        usual = standard_study("scaling")
+        asked = replace(usual, measure=replace(usual.measure, seconds=study.measure.seconds))
+        parts += [
+            OtherPart("scaling", "how times grow", _GROWTH, _scaling, (k, asked, machine())) for k in study.growth
+        ]
     if study.name in EFFORTS and set(standard_study(study.name).scenes) <= set(study.scenes):
         parts += [_paper(name) for name in experiments_of(claims(), study.name)]
     return parts
@@ -67,15 +70,19 @@ def spans_of(seconds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
 # --- kernels ---------------------------------------------------------------------------------------------------------
 
 
-def _stability(rays: int, progress: Progress) -> Computed:
+def _users_kernels() -> dict[str, list[str]]:
+    """Return the kernels of the user, with digests of their code."""
+    return {name: user_code(Configuration("", name)) for name in KERNELS if is_users(name)}
+
+
+@kept("report-stability", "validation.kernels.stability")
+def _stability(rays: int, added: Mapping[str, list[str]], *, progress: Progress) -> list[Stability]:
     """Return how stable kernels are. Nearly all of its time goes into compilation: a process compiles them quickly."""
-    from realtime.kernels.registry import KERNELS
     from validation.kernels.stability import stability
 
     how: dict[str, Any] = {"what": "study", "name": "of the kernels", "limit": math.inf, "quick": True}
     known: list[Stability] = in_own_process(known_kernels, rays, **how)
-    added = [name for name in KERNELS if name not in {kernel.kernel for kernel in known}]
-    return {"kernels": known + (stability(added, count=rays, progress=counted(progress)) if added else [])}, {}
+    return known + (stability(list(added), count=rays, progress=counted(progress)) if added else [])
 
 
 def known_kernels(rays: int) -> list[Stability]:
@@ -88,20 +95,13 @@ def known_kernels(rays: int) -> list[Stability]:
 # --- growth ----------------------------------------------------------------------------------------------------------
 
 
-def _scaling(kind: str, seconds: float) -> OtherPart:
+@kept("report-scaling", "validation.study.growth", "validation.study.ladders")
+def _scaling(kind: str, study: Study, machine: Mapping[str, str], *, progress: Progress) -> list[Scaling]:
     """Return how times grow with one kind of work."""
     from validation.study.growth import study_growth
     from validation.study.ladders import ladder
 
-    usual = standard_study("scaling")
-    study = replace(usual, measure=replace(usual.measure, seconds=seconds))
-
-    def compute(progress: Progress) -> Computed:
-        steps = ladder(kind, study.scenes[0], study.sizes[0])
-        return {"scaling": study_growth(study, kind, steps, progress=counted(progress))}, {}
-
-    key = key_of("report-scaling", study_growth, ladder, machine=machine(), kind=kind, study=study)
-    return OtherPart("scaling", "how times grow", key, _GROWTH, compute)
+    return study_growth(study, kind, ladder(kind, study.scenes[0], study.sizes[0]), progress=counted(progress))
 
 
 # --- claims of papers ------------------------------------------------------------------------------------------------
@@ -116,20 +116,22 @@ def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[s
 
 def _paper(name: str) -> OtherPart:
     experiment = experiments()[name]
-
-    def compute(progress: Progress) -> Computed:
-        progress(0.0, "claims of papers")
-        return {"experiment": name, "figures": experiment.run()}, {}
-
     module = f"validation.papers.{experiment.function.partition(':')[0]}"
-    key = key_of("report-paper", module, experiment=name, machine=machine())
-    return OtherPart("papers", name, key, experiment.seconds, compute)
+    return OtherPart("papers", name, experiment.seconds, _experiment, (name, source_digest(module), machine()))
 
 
-def paper_rows(results: Sequence[Result]) -> list[Judged]:
+@kept("report-paper", "validation.papers.claims")
+def _experiment(
+    name: str, source: str, machine: Mapping[str, str], *, progress: Progress
+) -> tuple[str, dict[str, Any]]:
+    """Return the name of an experiment and its figures; `source` is the digest of its module."""
+    progress(0.0, "claims of papers")
+    return name, experiments()[name].run()
+
+
+def paper_rows(results: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Judged]:
     """Return the claims that the results of experiments decide."""
-    found = {result.data["experiment"]: result.data["figures"] for result in results}
-    return decided(claims(), found) if found else []
+    return decided(claims(), dict(results)) if results else []
 
 
 def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[Judged]:
@@ -146,7 +148,6 @@ def measure_claims(chosen: Sequence[Claim], *, quick: bool = False, progress: Pr
     parts = {name: _paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])}
     steps = spans_of({name: part.seconds for name, part in parts.items()})
     figures = {
-        name: part.result(part_of(progress, *steps[name], before=f"{name}, ")).data["figures"]
-        for name, part in parts.items()
+        name: part.result(part_of(progress, *steps[name], before=f"{name}, ")).value[1] for name, part in parts.items()
     }
     return decided(chosen, figures)

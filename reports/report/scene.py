@@ -66,7 +66,7 @@ def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> Method:
         **vars(row_record(row, named)),
         measured=judged.results[0].measured,
         seconds=round(sum(result.seconds for result in judged.results), 3),
-        cached=all(result.cached for result in judged.results),
+        cached=all(result.loaded for result in judged.results),
     )
 
 

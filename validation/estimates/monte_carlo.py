@@ -31,7 +31,6 @@ from reference.scene.read import read_reference
 from reference.storage.cache import cache_folder, drop_arrays
 from reference.storage.files import NO_SPACE
 from reference.storage.kept import Spent, add_spent, is_damaged, is_kept, key_of, load, stopwatch, store
-from reference.storage.scene_digest import scene_digest
 from validation.estimates.quadrature import check_camera, check_rays
 
 Progress = Callable[[int, int, str], None]
@@ -106,7 +105,7 @@ def monte_carlo_batches(
     settings = {"samples": samples, "max_depth": max_depth, "orders": orders, "counts": counts}
     function = {"single-scatter": single_scatter_batch, "cloud-paths": cloud_paths_batch}.get(estimator, volpath_batch)
     function = volpath_orders_batch if estimator == "volpath" and orders is not None else function
-    folder = key_of(estimator, function, scene=scene_digest(scene), **settings)
+    folder = key_of(estimator, function, scene=scene, **settings)
     layers, trace = batch_tracer(scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders)
     tally: Counter[str] = Counter()
 
@@ -246,7 +245,7 @@ def _load(folder: str, seeds: range, samples: int, layers: tuple[str, ...], tall
     if kept is None:
         tally["damaged"] += is_damaged(name)
         return None
-    stored = kept.arrays
+    stored = kept.value
     tally["cached"] += len(seeds)
     squares = stored["squares"] if len(seeds) > 1 else np.zeros_like(stored["mean"])
     return Batches(tuple(seeds), samples, stored["mean"], squares, stored["totals"], layers)

@@ -24,8 +24,7 @@ How near is on the ray? Mitsuba holds positions as float32 numbers, the largest 
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import Field, fields, replace
-from types import MappingProxyType
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,16 +38,13 @@ from reference.quadrature.replicates import Keep
 from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import holds
 from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
-from reference.storage.cache import drop_arrays
 from reference.storage.exr import TOTAL
-from reference.storage.kept import Kept, Spent, is_kept, kept, key_of, load, stopwatch, store
-from reference.storage.scene_digest import scene_digest
+from reference.storage.kept import kept, load, stopwatch, store
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
 _ROUNDING = 2.0**-24
-_USUAL: dict[str, Any] = {"checks": 32, "shadow_scale": 1.0, "pixel": "centre"}
 
 
 def reference_image(
@@ -59,33 +55,25 @@ def reference_image(
     `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`.
     Radiance that is not finite is refused.
     """
-    settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
-    return kept_reference(scene, settings, progress=progress)[0]
+    return kept_reference(scene, checks, shadow_scale, pixel, progress=progress)
 
 
+@kept("quadrature", quadrature_image)
 def kept_reference(
-    scene, settings: Mapping[str, Any] = MappingProxyType(_USUAL), *, progress: Progress | None = None
-) -> tuple[ReferenceImage, Kept]:
-    """Return what `reference_image` does, and how it is kept: what it took, and whether it was there already."""
-    key, spent = _key(scene, settings), stopwatch()
-    stored = load(key)
-    if stored is not None:
-        values = {each.name: _as_kept(each, stored.arrays.get(each.name)) for each in fields(ReferenceImage)}
-        return ReferenceImage(**values), stored
+    scene, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", *, progress: Progress | None = None
+) -> ReferenceImage:
+    """Return what `reference_image` does; it is kept."""
     reference = read_reference(scene)
-    parts = _Parts(key)
+    settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
     # Only area lights take so long that a run is worth going on with.
-    keep = parts if reference.area and settings["pixel"] == "centre" else None
-    image = _checked_image(reference, settings, keep=keep, progress=progress)
-    stored = _store(key, image, spent())
-    parts.drop()
-    return image, stored
+    keep = _parts(kept_reference.key(scene, **settings)) if reference.area and pixel == "centre" else None
+    return _checked_image(reference, settings, keep=keep, progress=progress)
 
 
 def reference_of_pixels(scene, pixels: NDArray[np.integer]) -> ReferenceImage:
     """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row, (1, count, 3); not kept."""
     whole = read_reference(scene)
-    return _checked_image(replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels]), _USUAL)
+    return _checked_image(replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels]), {})
 
 
 def _checked_image(
@@ -97,51 +85,21 @@ def _checked_image(
 ) -> ReferenceImage:
     """Return the reference of an image whose every value is finite."""
     check_camera(reference)
-    if settings["pixel"] == "centre":
+    if settings.get("pixel", "centre") == "centre":
         check_rays(reference, surface_hits(reference).distance)
     image = quadrature_image(reference, **settings, keep=keep, progress=progress)
     check_values(reference, image)
     return image
 
 
-def keep_reference(scene, image: ReferenceImage, spent: Spent, *, pixel: str = "centre") -> None:
-    """Keep a reference that another process computed by `reference_image`, and what it took, for this one to find."""
-    _store(_key(scene, _USUAL | {"pixel": pixel}), image, spent)
+def _parts(key: str) -> Keep:
+    """Return what keeps parts of a reference until it is done: a run that was interrupted goes on from them."""
 
+    def keep(name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
+        found, spent = load(f"{key}/{name}"), stopwatch()
+        return (found or store(f"{key}/{name}", work(), spent())).value
 
-def has_reference(scene, *, pixel: str = "centre") -> bool:
-    """Return whether the reference of a scene is kept."""
-    return is_kept(_key(scene, _USUAL | {"pixel": pixel}))
-
-
-def _key(scene, settings: Mapping[str, Any]) -> str:
-    return key_of("quadrature", quadrature_image, scene=scene_digest(scene), **settings)
-
-
-def _store(key: str, image: ReferenceImage, spent: Spent) -> Kept:
-    values = {each.name: getattr(image, each.name) for each in fields(ReferenceImage)}
-    return store(key, {name: value for name, value in values.items() if value is not None}, spent)
-
-
-class _Parts:
-    """Parts of a reference, kept until it is done: a run that was interrupted goes on from them."""
-
-    def __init__(self, key: str) -> None:
-        self._key, self._names = key, list[str]()
-
-    def __call__(self, name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        self._names.append(f"{self._key}/{name}")
-        return kept(self._names[-1], work).arrays
-
-    def drop(self) -> None:
-        """Forget all parts."""
-        for name in self._names:
-            drop_arrays(name)
-
-
-def _as_kept(field: Field, value: Any) -> Any:
-    """Return an array, or the number that was stored as an array without dimensions."""
-    return field.type(value) if field.type in (int, float) else value
+    return keep
 
 
 def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = True) -> Array:

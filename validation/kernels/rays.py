@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from analytic.phase import PHASE_NAMES
-from reference.storage.kept import kept, key_of
+from reference.storage.kept import kept
 from validation.kernels.case_files import Cases, integrate_cases
 from validation.kernels.cases import TABLE
 
@@ -103,9 +103,7 @@ def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t
 
 def with_reference(cases: Cases) -> Cases:
     """Return cases with J to about 1e-12, from the cache where it was computed before."""
-    columns = (cases.g, cases.foot, cases.height, cases.x0, cases.x1, cases.sigma_t)
-    key = key_of("kernel-rays", _reference, columns=columns, phases=cases.phase)
-    return replace(cases, value=kept(key, lambda: {"value": _reference(cases)}).arrays["value"])
+    return replace(cases, value=_reference(cases))
 
 
 def case_row(cases: Cases, k: int) -> str:
@@ -118,6 +116,7 @@ def case_row(cases: Cases, k: int) -> str:
     return ",".join([cases.tag[k] if cases.tag else "", cases.phase[k], *words, value])
 
 
+@kept("kernel-rays")
 def _reference(cases: Cases) -> Array:
     return integrate_cases(cases, rtol=1e-12, table=TABLE)[0]
 

@@ -12,7 +12,6 @@ Read in this order:
 - `reference.py`: the reference that the cells of an image share;
 - `stated_errors.py`: the errors that methods state for themselves;
 - `run.py`: a cell is rendered, timed and compared, and becomes a row;
-- `results.py`: results on disk, so that a study computes only what changed;
 - `scene.py`: the study of one scene: reference, checks, rows, images;
 - `keys.py`: what decides the numbers of a row, as a digest;
 - `rows.py`: finished rows on disk, and their Parquet;

@@ -8,6 +8,7 @@ reference there, chosen by chance once for all: quantiles of errors need no more
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,7 @@ from reference.quadrature.ray_values import ReferenceImage, ray_values
 from reference.quadrature.replicates import PointPlan, standard_error
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_reference
-from reference.storage.kept import Spent, kept, key_of, stopwatch
-from reference.storage.scene_digest import scene_digest
+from reference.storage.kept import Spent, kept, stopwatch
 from validation.estimates.quadrature import check_camera, check_rays, reference_image
 from validation.metrics.errors import FLOOR
 from validation.scenes.changes import parse_changes
@@ -88,13 +88,13 @@ def cell_reference(loaded: LoadedScene) -> Reference:
     if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
         spent = stopwatch()
         return of_image(reference_image(loaded.scene), spent())
-    key = key_of("sweep-reference", sampled_reference, scene=scene_digest(loaded.scene))
-    result = kept(key, lambda: sampled_reference(loaded.scene))
-    some = result.arrays
+    result = sampled_reference.result(loaded.scene)
+    some = result.value
     return Reference(some["airlight"], some["bound"], None, some["mask"], None, result.spent)
 
 
-def sampled_reference(scene) -> dict[str, Array]:
+@kept("sweep-reference")
+def sampled_reference(scene) -> dict[str, NDArray[Any]]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
     reference = read_reference(scene)
     check_camera(reference)

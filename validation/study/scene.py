@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -22,32 +22,32 @@ from realtime.frame.renderer import Frame
 from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image
-from reference.storage.kept import Kept, is_kept, key_of
+from reference.storage.kept import Kept, Spent, kept
 from validation.columns import record_of
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.estimates.quadrature import has_reference, kept_reference, reference_image
+from validation.estimates.quadrature import kept_reference, reference_image
 from validation.metrics.flip import Flip, flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
 from validation.statistics.records import Agreement, MultipleScattering
 from validation.study.configuration import Configuration, configuration_work, user_code
-from validation.study.cost import reference_work, sampled_work
+from validation.study.cost import Work, reference_work, sampled_work
 from validation.study.reference import of_image
-from validation.study.results import Computed, Result, cached_result
 from validation.study.row import Row
 from validation.study.run import Apart, cell_row, layered_frame, run
-from validation.study.study import Cell, Study
+from validation.study.study import Cell, Checks, Study
 from validation.timing import FrameTimes
 
 if TYPE_CHECKING:  # what only reports of images need is imported there
     from validation.engine.images import EngineImage
 
 Array = NDArray[np.float64]
+Layer = NDArray[np.floating]  # frames are float32
 Progress = Callable[[float, str], None]
 
 _MULTIPLE = (64, 48)  # size of the image whose share of multiple scattering is measured [pixels]
-_LAYER = "layer "  # begins the names of arrays that are layers of an image from elsewhere
+_DEPTH = "depth"  # the distance among the arrays of a frame
 _COMPILED = 2.0  # that the kernels of a configuration or an estimator take [s], beside its work on one thread
 
 
@@ -74,14 +74,14 @@ class SceneStudy:
             return read_scene(scene)
 
     @cached_property
-    def kept_reference(self) -> tuple[ReferenceImage, Kept]:
+    def kept_reference(self) -> Kept[ReferenceImage]:
         """The quadrature reference at pixel centres, and what it took."""
-        return kept_reference(self.loaded.scene)
+        return kept_reference.result(self.loaded.scene)
 
     @property
     def reference(self) -> ReferenceImage:
         """The quadrature reference at pixel centres."""
-        return self.kept_reference[0]
+        return self.kept_reference.value
 
     @cached_property
     def identity(self) -> str:
@@ -128,15 +128,28 @@ class SceneStudy:
     def seconds(self) -> dict[str, float]:
         """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
         lights = len(self.scene.lights) + 16 * len(self.scene.area_lights)
-        checks, parts = self.study.checks, {"reference": 0.0}
-        if not has_reference(self.loaded.scene):
-            parts["reference"] = reference_work(self.size, lights=lights).seconds
-        parts["checks"] = 0.0 if is_kept(_checks_key(self)) else len(checks.margins) * (checks.patience or 60.0)
-        samples = 20 * checks.multiple[0] * checks.multiple[1]
-        works = {"multiple scattering": (_multiple_key(self), sampled_work(_MULTIPLE, samples))}
+        checks, parts = self.study.checks, dict[str, float]()
+        kept = kept_reference.is_kept(self.loaded.scene)
+        parts["reference"] = 0.0 if kept else reference_work(self.size, lights=lights).seconds
+        with self.at(checks.size) as scene:
+            kept = check_reference.is_kept(scene, checks)
+        parts["checks"] = 0.0 if kept else len(checks.margins) * (checks.patience or 60.0)
+        batches, samples = checks.multiple
+        with self.at(_MULTIPLE) as scene:
+            kept = multiple_scattering.is_kept(scene, batches, samples)
+        parts["multiple scattering"] = 0.0 if kept else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
         for chosen in self.configurations:
-            works[chosen.label] = (_cell_key(self, chosen), configuration_work(self.scene, chosen))
-        return parts | {name: 0.0 if is_kept(key) else _COMPILED + work.seconds for name, (key, work) in works.items()}
+            kept = measured.is_kept(*self.given(chosen))
+            parts[chosen.label] = 0.0 if kept else _seconds(configuration_work(self.scene, chosen))
+        return parts
+
+    def given(self, chosen: Configuration) -> tuple[Cell, list[str], Mapping[str, str]]:
+        """Return what decides the row and the image of a configuration."""
+        return replace(self.cell(chosen), scene=self.identity), user_code(chosen), self.machine
+
+
+def _seconds(work: Work) -> float:
+    return _COMPILED + work.seconds
 
 
 @dataclass(frozen=True)
@@ -147,7 +160,7 @@ class Judged:
     image: Image | None = None  #: its layers; None if there is none
     expected: Array | None = None  #: what its layer `row.layer` was compared with, (height, width, 3) [W/(m^2 sr)]
     whole: Array | None = None  #: what all of its light is compared with by HDR-FLIP; None where nobody asks
-    results: tuple[Result, ...] = ()  #: that it was made of
+    results: tuple[Kept[Any], ...] = ()  #: that it was made of
 
     @property
     def light(self) -> Array:
@@ -163,11 +176,11 @@ class SceneResult:
 
     study: SceneStudy
     reference: ReferenceImage
-    agreement: Mapping[str, Agreement]  #: by estimator and layer, as `volpath airlight`
+    agreement: Mapping[str, Agreement]  #: by estimator and layer
     multiple: MultipleScattering
     rows: tuple[Judged, ...]
     seconds: Mapping[str, float]  #: that its parts took when they were computed
-    results: tuple[Result, ...] = field(repr=False, default=())  #: every part, as it was kept
+    results: tuple[Kept[Any], ...] = field(repr=False, default=())  #: every part, as it was kept
 
 
 def open_scene(name_or_path: str, study: Study, machine: Mapping[str, str]) -> SceneStudy:
@@ -193,12 +206,13 @@ def study_scene(
     So many `workers` compute HDR-FLIP at once, each on one processor.
     """
     progress("reference")
-    reference, kept = study.kept_reference
-    made = Result({}, {}, kept.made, round(kept.spent.seconds, 3), kept.loaded)
+    reference, checks = study.kept_reference, study.study.checks
     progress("checks")
-    checks = cached_result(_checks_key(study), lambda: (check_reference(study, spread=spread), {}))
+    with study.at(checks.size) as scene:
+        agreement = check_reference.result(scene, checks, spread=spread)
     progress("multiple scattering")
-    multiple = cached_result(_multiple_key(study), partial(_multiple, study))
+    with study.at(_MULTIPLE) as scene:
+        multiple = multiple_scattering.result(scene, *checks.multiple)
     rows = []
     for chosen in study.configurations:
         progress(chosen.label)
@@ -207,12 +221,11 @@ def study_scene(
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
     rows += [_image(study, shown) for shown in images]
-    results = (made, checks, multiple, *(result for row in rows for result in row.results))
-    seconds = {"reference": made.seconds, "agreement": checks.seconds, "multiple": multiple.seconds}
-    seconds["methods"] = round(sum(result.seconds for result in results[3:]), 3)
-    agreement = {name: record_of(each, Agreement) for name, each in checks.data.items()}
-    found = record_of(multiple.data, MultipleScattering)
-    return SceneResult(study, reference, agreement, found, tuple(rows), seconds, results)
+    methods = [result for row in rows for result in row.results]
+    seconds = {"reference": reference.seconds, "agreement": agreement.seconds, "multiple": multiple.seconds}
+    seconds["methods"] = round(sum(result.seconds for result in methods), 3)
+    results: tuple[Kept[Any], ...] = (reference, agreement, multiple, *methods)
+    return SceneResult(study, reference.value, agreement.value, multiple.value, tuple(rows), seconds, results)
 
 
 def configurations_for(features: SceneFeatures, configurations: Sequence[Configuration]) -> tuple[Configuration, ...]:
@@ -227,84 +240,76 @@ def configurations_for(features: SceneFeatures, configurations: Sequence[Configu
     return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
 
 
-def check_reference(study: SceneStudy, *, spread: ElsewhereFor | None = None) -> dict[str, Agreement]:
+@kept("scene-checks")
+def check_reference(scene, checks: Checks, *, spread: ElsewhereFor | None = None) -> dict[str, Agreement]:
     """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
-    checks = study.study.checks
-    with study.at(checks.size) as scene:
-        return agreements(
-            scene,
-            checks.margins,
-            batches=checks.batches,
-            samples=checks.samples,
-            seconds=checks.patience,
-            spread=spread,
-        )
+    return agreements(
+        scene, checks.margins, batches=checks.batches, samples=checks.samples, seconds=checks.patience, spread=spread
+    )
 
 
-def _checks_key(study: SceneStudy) -> str:
-    asked = asdict(study.study.checks)
-    return key_of("scene-checks", check_reference, scene=study.identity, machine=study.machine, **asked)
+@kept("scene-multiple")
+def multiple_scattering(scene, batches: int, samples: int) -> MultipleScattering:
+    """Return the share of multiple scattering; see `validation.estimates.multiple_scattering`."""
+    return multiple_scattering_fraction(scene, batches=batches, samples=samples)
 
 
-def _multiple_key(study: SceneStudy) -> str:
-    asked = study.study.checks.multiple
-    return key_of("scene-multiple", multiple_scattering_fraction, scene=study.identity, multiple=asked)
+@dataclass(frozen=True)
+class Measured:
+    """What is kept of a row."""
+
+    row: Row
+    layers: dict[str, Layer] = field(default_factory=dict)  #: of its image, the distance among them; none without one
+    expected: Any = None  #: what an image from elsewhere was compared with
+    whole: Any = None  #: and what all of its light is compared with by HDR-FLIP
 
 
-def _multiple(study: SceneStudy) -> Computed:
-    batches, samples = study.study.checks.multiple
-    with study.at(_MULTIPLE) as scene:
-        return multiple_scattering_fraction(scene, batches=batches, samples=samples), {}
-
-
-def _cell_key(study: SceneStudy, chosen: Configuration) -> str:
-    cell = replace(study.cell(chosen), scene=study.identity)
-    return key_of("cell", _measured, cell=cell, code=user_code(chosen), machine=study.machine)
-
-
-def _measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> Computed:
-    """Return the row and the image of a configuration."""
-    row, frame = run(study.cell(chosen), study.scene, of_image(study.reference), timed_scene=study.timed, apart=apart)
+# A fault of the user's method may have gone by the next run.
+@kept("cell", worth=lambda found: found.row.kind == "built-in" or found.row.status == "done")
+def measured(
+    cell: Cell, code: list[str], machine: Mapping[str, str], *, study: SceneStudy, apart: Apart | None
+) -> Measured:
+    """Return the row and the image of a cell, whose scene is an identity; `code` is that of the user in it."""
+    asked = replace(cell, scene=study.path)
+    row, frame = run(asked, study.scene, of_image(study.reference), timed_scene=study.timed, apart=apart)
+    row = record_of(row, Row)  # without numbers that are not finite
     if frame is None:
-        return row, {}
-    return row, {"airlight": frame.airlight, "surface": frame.surface, "depth": frame.distance, **frame.extra}
+        return Measured(row)
+    return Measured(row, {"airlight": frame.airlight, "surface": frame.surface, _DEPTH: frame.distance, **frame.extra})
 
 
 def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: Mapping[Configuration, str]) -> Judged:
     if chosen in ended:
         row = cell_row(study.cell(chosen), status="refused", reason=ended[chosen])
-        return Judged(row, results=(Result(row, {}, time.time(), 0.0, False),))
-    _ = study.reference  # loaded or computed now: it is no part of the time of a configuration
-    # A fault of the user's method may have gone by the next run.
-    worth = (lambda row: row.status == "done") if chosen.own else (lambda row: True)
-    result = cached_result(_cell_key(study, chosen), partial(_measured, study, chosen, apart), worth=worth)
-    row = record_of(result.data, Row)
-    if not result.arrays:
-        return Judged(row, results=(result,))
-    airlight, surface, distance = (result.arrays[name] for name in ("airlight", "surface", "depth"))
-    extra = {name: array for name, array in result.arrays.items() if name not in ("airlight", "surface", "depth")}
-    image = layered_frame(study.name, chosen, Frame(airlight, surface, distance, extra))
-    whole = study.reference.airlight + study.reference.surface if study.study.wants_flip(chosen) else None
-    return Judged(row, image, study.reference.airlight, whole, (result,))
+        return Judged(row, results=(Kept(row, Spent(0.0, 0.0), time.time(), False),))
+    reference = study.reference  # loaded or computed now: it is no part of the time of a configuration
+    result = measured.result(*study.given(chosen), study=study, apart=apart)
+    if not result.value.layers:
+        return Judged(result.value.row, results=(result,))
+    layers = dict(result.value.layers)
+    airlight, surface, distance = (layers.pop(name) for name in ("airlight", "surface", _DEPTH))
+    image = layered_frame(study.name, chosen, Frame(airlight, surface, distance, layers))
+    whole = reference.airlight + reference.surface if study.study.wants_flip(chosen) else None
+    return Judged(result.value.row, image, reference.airlight, whole, (result,))
+
+
+@kept("flip")
+def flip(reference: Array, test: Array, version: str) -> tuple[Flip, Layer | None]:
+    """Return HDR-FLIP by a version of its program, and its map."""
+    found, error_map = flip_hdr(reference, test)
+    return record_of(found, Flip), error_map
 
 
 def _with_flip(judged: Judged) -> Judged:
     """Return a row with its HDR-FLIP, whose map is a grey layer of the image, where it is asked for."""
     if judged.whole is None or judged.image is None:
         return judged
-    shown = judged.whole, judged.light
-
-    def compute() -> Computed:
-        flip, error_map = flip_hdr(*shown)
-        return flip, {} if error_map is None else {"map": error_map}
-
-    result = cached_result(key_of("flip", flip_hdr, images=shown, version=_flip_version()), compute)
+    result = flip.result(judged.whole, judged.light, _flip_version())
+    found, error_map = result.value
     image = judged.image
-    if "map" in result.arrays:
-        grey = np.repeat(result.arrays["map"][:, :, None], 3, axis=2)
-        image = replace(image, layers=dict(image.layers) | {"flip": grey})
-    row = replace(judged.row, flip=record_of(result.data, Flip))
-    return replace(judged, row=row, image=image, results=(*judged.results, result))
+    if error_map is not None:
+        image = replace(image, layers=dict(image.layers) | {"flip": np.repeat(error_map[:, :, None], 3, axis=2)})
+    return replace(judged, row=replace(judged.row, flip=found), image=image, results=(*judged.results, result))
 
 
 def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
@@ -312,54 +317,47 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     from validation.engine.images import image_times
 
     digest = hashlib.sha256(shown.path.read_bytes()).hexdigest()
-    key = key_of(
-        "scene-image",
-        _image_measured,
-        scene=study.identity,
-        size=study.size,
-        label=shown.label,
-        file=digest,
-        times=image_times(shown.path),
+    result = measured_image.result(
+        study.identity, study.size, shown.label, digest, image_times(shown.path), study=study, shown=shown
     )
-    result = cached_result(key, partial(_image_measured, study, shown))
-    layers = {name.removeprefix(_LAYER): array for name, array in result.arrays.items() if name.startswith(_LAYER)}
-    attributes = {"airlight:scene": study.name, "airlight:image": shown.path.name}
-    whole = None if study.study.flip == "none" else result.arrays.get("whole")
-    image, row = Image(layers, attributes=attributes), record_of(result.data, Row)
-    return Judged(row, image, result.arrays["expected"], whole, (result,))
+    found, attributes = result.value, {"airlight:scene": study.name, "airlight:image": shown.path.name}
+    whole = None if study.study.flip == "none" else found.whole
+    return Judged(found.row, Image(found.layers, attributes=attributes), found.expected, whole, (result,))
 
 
-def _image_measured(study: SceneStudy, shown: "EngineImage") -> Computed:
-    from validation.engine.images import image_times, measure_image, notes_of
+@kept("scene-image")
+def measured_image(
+    scene: str, size: tuple[int, int], label: str, digest: str, times: Any, *, study: SceneStudy, shown: "EngineImage"
+) -> Measured:
+    """Return the row of an image with its layers, from the identity of its scene and the digest of its file."""
+    from validation.engine.images import measure_image, notes_of
 
-    timed = image_times(shown.path)
     judged, layers, surface = measure_image(
         shown, study.loaded, study.reference_of, surfaces=study.scene.features.surfaces
     )
     row = Row(
         scene=study.path,
-        label=shown.label,
+        label=label,
         method="image",
         kernel=None,
         parameters="{}",
-        width=study.size[0],
-        height=study.size[1],
+        width=size[0],
+        height=size[1],
         status="done",
-        note=notes_of(judged, timed),
+        note=notes_of(judged, times),
         kind="image",
         layer=judged.expected,
         pixel=judged.pixel,
         error=judged.comparison.metrics,
         surface_error=surface,
-        times=None if timed is None else FrameTimes(timed[0]),
+        times=None if times is None else FrameTimes(times[0]),
     )
-    arrays: dict[str, Any] = {f"{_LAYER}{name}": values for name, values in layers.items()}
-    arrays["expected"], reference = judged.reference, judged.fit.reference
+    reference, whole = judged.fit.reference, None
     if judged.expected == TOTAL:
-        arrays["whole"] = judged.reference
+        whole = judged.reference
     elif "surface" in layers or not np.any(reference.surface > 0):
-        arrays["whole"] = reference.airlight + reference.surface
-    return row, arrays
+        whole = reference.airlight + reference.surface
+    return Measured(record_of(row, Row), dict(layers), judged.reference, whole)
 
 
 def _flip_version() -> str:

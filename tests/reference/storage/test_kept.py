@@ -2,6 +2,7 @@
 """Claim: what is kept is found again until its arguments or the code that computes it change, and no longer."""
 
 import inspect
+import math
 import os
 import re
 import subprocess
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
@@ -25,7 +27,6 @@ from reference.storage.kept import (
     code_digest,
     fresh_results,
     fresh_since,
-    is_kept,
     kept,
     key_of,
     load,
@@ -33,46 +34,83 @@ from reference.storage.kept import (
     stopwatch,
     store,
 )
-from reports.machine.driver_check import driver_error
-from validation.estimates.multiple_scattering import multiple_scattering_fraction
+from reports.machine.driver_check import error_of_device
 from validation.kernels.rays import _reference
 from validation.kernels.stability import stability
-from validation.metrics.flip import flip_hdr
 from validation.study.growth import study_growth
 from validation.study.reference import sampled_reference
 from validation.study.run import run
-from validation.study.scene import _image_measured, _measured, check_reference
+from validation.study.scene import check_reference, flip, measured, measured_image, multiple_scattering
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 
 
-def counted(calls, value=1.0):
-    def compute():
-        calls.append(value)
-        return {"a": np.full(3, value)}
+@dataclass(frozen=True)
+class Inner:
+    pair: tuple[int, float]
+    array: NDArray[np.float32] | None = None
 
-    return compute
+
+@dataclass(frozen=True)
+class Value:
+    a: NDArray[np.float64]
+    words: list[str]
+    parts: dict[str, Inner]
+    number: float
+
+
+@kept("page")
+def page(name, value=1.0, *, calls=None) -> Value:
+    if calls is not None:
+        calls.append(name)
+    array = np.full((2, 1), 0.1, np.float32)
+    return Value(np.full(3, value), ["a"], {"x": Inner((1, 0.1 * 3)), "y": Inner((2, 2.0), array)}, math.nan)
 
 
 @pytest.mark.claim("report-kept")
 def test_what_was_computed_is_found_again_and_fresh_results_are_not_older_than_the_run():
-    calls: list[float] = []
-    first, second = (kept("page-a", counted(calls)) for _ in range(2))
+    calls: list[str] = []
+    first, second = (page.result("a", calls=calls) for _ in range(2))
     assert (len(calls), first.loaded, second.loaded) == (1, False, True)
     assert (first.spent, first.made) == (second.spent, second.made)
-    np.testing.assert_array_equal(first.arrays["a"], second.arrays["a"])
-    assert second.arrays.keys() == {"a"}
+    for value in (first.value, second.value):
+        np.testing.assert_array_equal(value.a, np.ones(3))
+        assert (value.words, value.parts["x"], value.parts["y"].pair) == (["a"], Inner((1, 0.1 * 3)), (2, 2.0))
+        assert (value.parts["y"].array.dtype, value.parts["y"].array.shape) == (np.float32, (2, 1))
+        assert math.isnan(value.number)
+    key = page.key("a")
     with fresh_results(time.time()):
-        assert (is_kept("page-a"), load("page-a")) == (False, None)
-        assert not kept("page-a", counted(calls, 2.0)).loaded
-        assert kept("page-a", counted(calls)).loaded  # computed in this run
+        assert (page.is_kept("a"), load(key)) == (False, None)
+        assert not page.result("a", calls=calls).loaded
+        assert page.result("a", calls=calls).loaded  # computed in this run
         # Another process of the run does the same.
-        code = "from reference.storage.kept import *\nprint(is_kept('page-a'), fresh_since())"
+        code = f"from reference.storage.kept import *\nprint(is_kept('{key}'), fresh_since())"
         ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=_with_root())
         assert ran.stdout.split() == ["True", repr(fresh_since())]
     assert fresh_since() is None
-    assert kept("page-a", counted(calls)).arrays["a"][0] == 2.0
+    assert page.result("a", calls=calls).made > first.made
     assert len(calls) == 2
+
+
+def test_what_decides_a_value_is_in_its_key_and_what_does_not_is_not():
+    assert page.key("a") == page.key("a", 1.0) == page.key(name="a", value=1.0) == page.key("a", calls=[])
+    assert len({page.key("a"), page.key("b"), page.key("a", 2.0)}) == 3
+
+
+def test_what_is_not_worth_it_is_not_kept():
+    @kept("page", worth=lambda row: row["status"] == "done")
+    def row(status) -> dict[str, str]:
+        return {"status": status}
+
+    assert [row.result(status).value["status"] for status in ("done", "refused")] == ["done", "refused"]
+    assert (row.is_kept("done"), row.is_kept("refused")) == (True, False)
+
+
+def test_another_process_may_have_computed_a_value_and_parts_of_it_go_once_it_is_there():
+    store(f"{page.key('a')}/part", {"a": 1}, Spent(1.0, 1.0))
+    page.keep(page("b"), Spent(100.0, 50.0), "a")
+    assert (page.result("a").loaded, page.result("a").seconds) == (True, 100.0)
+    assert load(f"{page.key('a')}/part") is None
 
 
 def _with_root():
@@ -83,16 +121,17 @@ def test_times_are_those_of_computing_and_never_of_loading():
     """What is made from kept results took as long as they once did."""
     store("reference-a", {"a": 1}, Spent(100.0, 150.0))
 
-    def from_the_reference():
+    @kept("method")
+    def from_the_reference() -> int:
         load("reference-a")
         add_spent(Spent(1000.0, 0.0))  # in another process
-        return {"b": 2}
+        return 2
 
-    made = kept("method-a", from_the_reference)
+    made = from_the_reference.result()
     assert made.spent.seconds == pytest.approx(1100.0, abs=5.0)
     assert made.spent.processor == pytest.approx(150.0, abs=5.0)
     spent = stopwatch()
-    assert kept("method-a", counted([])).spent == made.spent
+    assert from_the_reference.result().spent == made.spent
     assert spent().seconds == pytest.approx(made.spent.seconds, abs=5.0)
 
 
@@ -201,13 +240,13 @@ def functions():
         "sweep-reference": (sampled_reference, quadrature),
         "row": (run, "realtime.methods.ray_march"),
         "scene-checks": (check_reference, "validation.statistics.comparison"),
-        "scene-multiple": (multiple_scattering_fraction, "reference.monte_carlo.volpath.integrator"),
-        "cell": (_measured, "realtime.methods.ray_march"),
-        "scene-image": (_image_measured, "validation.metrics.errors"),
-        "flip": (flip_hdr, "validation.metrics.errors"),
+        "scene-multiple": (multiple_scattering, "reference.monte_carlo.volpath.integrator"),
+        "cell": (measured, "realtime.methods.ray_march"),
+        "scene-image": (measured_image, "validation.metrics.errors"),
+        "flip": (flip, "validation.metrics.errors"),
         "report-stability": (stability, "realtime.kernels.exact"),
         "report-scaling": (study_growth, "realtime.methods.ray_march"),
-        "shader-driver": (driver_error, "realtime.export.text"),
+        "shader-driver": (error_of_device, "realtime.export.text"),
     }
 
 
@@ -234,7 +273,7 @@ def test_every_kind_hangs_on_the_code_that_computes_it_and_not_on_claims_of_pape
 def test_every_kind_that_is_kept_is_in_the_table():
     """But the experiments of papers, each of which hangs on its module."""
     text = "".join(path.read_text(encoding="utf-8") for path in module._modules().values())
-    kinds = set(re.findall(r'key_of\(\s*"([a-z-]+)"', text)) | set(re.findall(r'_key\(\s*"([a-z-]+)"', text))
+    kinds = set(re.findall(r'(?:key_of|@kept)\(\s*"([a-z-]+)"', text))
     assert kinds - {"report-paper"} <= functions().keys()
     assert {"quadrature", "kernel-rays", "sweep-reference", "row", "report-scaling"} <= kinds
 
