@@ -21,8 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not reproduced", "differs", "impossible"
-VERDICTS = (REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE)
+VERDICTS = REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not reproduced", "differs", "impossible"
 EFFORTS = ("quick", "default", "full", "paper")
 DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
 
@@ -49,22 +48,25 @@ class Claim:
     why: str = ""  #: why the words are read so, or why nothing can be measured
     ours: bool = False  #: the figure depends on the machine or on a scene of our own
 
-    def holds(self, value: float) -> bool:
-        """Return whether a value lies where the paper says."""
-        if self.direction == "within":
-            assert isinstance(self.limit, Sequence)
-            return self.limit[0] <= value <= self.limit[1]
-        goal = self.goal
-        away = abs(value - goal) > self.tolerance * (abs(goal) or 1.0)
-        answers = {"at most": value <= goal, "at least": value >= goal, "equal": not away, "unequal": away}
-        return answers[self.direction]
-
     @property
     def goal(self) -> float:
         """The number of the claim, printed or read out of its words; of a range its middle."""
-        number = self.published if self.limit is None else self.limit
-        assert number is not None, self.item
+        number: Any = self.published if self.limit is None else self.limit
         return sum(number) / len(number) if isinstance(number, Sequence) else float(number)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The range in which the figure lies, or, of 'unequal', does not."""
+        if isinstance(self.limit, Sequence):
+            return self.limit[0], self.limit[1]
+        away = self.tolerance * (abs(self.goal) or 1.0)
+        low = -math.inf if self.direction == "at most" else self.goal - away
+        return low, math.inf if self.direction == "at least" else self.goal + away
+
+    def holds(self, value: float) -> bool:
+        """Return whether a value lies where the paper says."""
+        low, high = self.bounds
+        return (low <= value <= high) != (self.direction == "unequal")
 
     @property
     def rule(self) -> str:
@@ -72,8 +74,7 @@ class Claim:
         if isinstance(self.limit, Sequence):
             return f"within {self.limit[0]:g} and {self.limit[1]:g}"
         words = f"{'' if self.direction == 'equal' else self.direction + ' '}{self.goal:.4g}"
-        percent = f"{100 * self.tolerance:g} %"
-        return words + (f" to {percent}" if self.tolerance > 1e-6 else "")
+        return words + (f" to {100 * self.tolerance:g} %" if self.tolerance > 1e-6 else "")
 
 
 @dataclass(frozen=True)
@@ -118,23 +119,14 @@ def claims() -> tuple[Claim, ...]:
 
 def taken(claim: Claim, figures: Figures) -> Figure | str:
     """Return the figure of a claim, or why there is none."""
-    parts = [_figure(figures[name]) for name in claim.figure.split(" / ")]
-    numbers: list[Figure] = []
+    parts = [figures[name] for name in claim.figure.split(" / ")]
     for part in parts:
         if isinstance(part, str):
             return part
-        numbers.append(part)
-    value, low, high = numbers[0]
-    for other, least, most in numbers[1:]:
+    (value, low, high), *others = (part if isinstance(part, Sequence) else (part, part, part) for part in parts)
+    for other, least, most in others:
         value, low, high = value / other, low / most, high / least
-    return (value, low, high) if math.isfinite(value) else "the measured figure is not finite"
-
-
-def _figure(number: Any) -> Figure | str:
-    if isinstance(number, str):
-        return number
-    value, low, high = number if isinstance(number, Sequence) else (number, number, number)
-    return float(value), float(low), float(high)
+    return (float(value), float(low), float(high)) if math.isfinite(value) else "the measured figure is not finite"
 
 
 def verdict(claim: Claim, figure: Figure) -> str:
