@@ -2,7 +2,7 @@
 """Which property of a scene goes with the error: rank correlations over scenes, the strongest of each configuration.
 
 Ranks, as neither an error nor a property has a scale of its own: the correlation is the same in decades. What goes with
-an error need not cause it. Properties go with one another too (more lights, more silhouettes): of several that say
+an error need not cause it. Properties go with one another too (more lights, more triangles): of several that say
 nearly the same the one that goes with the error most is named.
 
 All intervals hold together with the level (Bonferroni): each has the level 1 - (1 - level)/m of m correlations. With
@@ -84,4 +84,4 @@ def _of(sweep: Sweep, sample: Sample, name: str) -> Numbers:
 
 def property_words(name: str) -> str:
     """Return a property in words; of one that has none here its name without underscores."""
-    return PROPERTIES[name][0] if name in PROPERTIES else name.replace("_", " ")
+    return PROPERTIES.get(name) or name.replace("_", " ")

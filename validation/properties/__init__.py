@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of a scene (`properties.py`), from what the camera sees and lights reach (`view.py`)."""
+"""Properties of a scene (`properties.py`), from how far rays go and what lights reach (`view.py`)."""

@@ -1,79 +1,95 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of a scene: numbers that say what it holds. Sweeps keep them beside errors and times.
+"""Properties of a scene: numbers that say what it holds, and cost little. Sweeps keep them beside errors and times.
 
-Distances are shares of others, so that none depends on the unit of length. A share of light is that of 6144 points on a
-grid of camera rays.
+None depends on the unit of length. A fraction of light is that of 6144 points on a grid of camera rays.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.methods.shadow_planes.silhouettes import silhouette
-from realtime.scene.mesh_adjacency import read_occluders
+from realtime.scene.camera import read_camera, resized_camera
 from realtime.scene.phase import Phase
 from realtime.scene.read_scene import Scene
-from validation.properties.view import SeenView, optical_depth, see
+from validation.properties.view import Array, distance, light_places, lit_points, optical_depths
 
+_GRID = (32, 24)  # rays across and down the image
+_STEPS = 8  # points on each ray
 _COSINES = 4096
 
-#: Each with its words, and how it follows from what the camera sees.
-PROPERTIES: Mapping[str, tuple[str, Callable[[SeenView], float]]] = {
-    "lights": ("number of lights", lambda view: len(view.lights)),
-    "points": ("number of point lights", lambda view: _count(view, "point")),
-    "spots": ("number of spot lights", lambda view: _count(view, "spot")),
-    "directionals": ("number of directional lights", lambda view: _count(view, "directional")),
-    "areas": ("number of area lights", lambda view: _count(view, "area")),
-    "light_size": ("size of the largest area light from the middle of the view", lambda view: _light_size(view)),
-    "light_nearest": ("distance of the nearest light", lambda view: _light_nearest(view)),
-    "bounded": ("number of bounded media", lambda view: len(view.scene.medium.bounded_media)),
-    "optical_depth": ("optical depth", lambda view: float(optical_depth(view.scene, view.origin, view.ends).mean())),
-    "optical_depth_light": ("optical depth from the light", lambda view: _light_depth(view)),
-    "mean_cosine": ("mean cosine of scattering", lambda view: _mean_cosine(view.scene)),
-    "surface_share": ("fraction of pixels with surfaces", lambda view: float(np.isfinite(view.depth).mean())),
-    "lit_share": ("fraction of lit points", lambda view: float(view.lit.mean())),
-    "shadow_edges": ("shadow edges along a ray", lambda view: float(np.diff(view.lit).sum(axis=(0, 3)).mean())),
-    "triangles": ("number of triangles", lambda view: sum(each.face_count() for each in _meshes(view.scene))),
-    "silhouettes": ("silhouette edges", lambda view: _silhouettes(view)),
-    "pixels": ("pixels", lambda view: view.scene.camera.width * view.scene.camera.height),
+#: What they are called.
+PROPERTIES: Mapping[str, str] = {
+    "lights": "number of lights",
+    "points": "number of point lights",
+    "spots": "number of spot lights",
+    "directionals": "number of directional lights",
+    "areas": "number of area lights",
+    "bounded": "number of bounded media",
+    "optical_depth": "optical depth",
+    "mean_cosine": "mean cosine of scattering",
+    "surface_share": "fraction of pixels with surfaces",
+    "lit_share": "fraction of lit points",
+    "triangles": "number of triangles",
+    "pixels": "pixels",
 }
 
 
 def scene_properties(scene: Scene) -> dict[str, float]:
     """Return the properties of a scene by name, as `realtime.scene.read_scene.read_scene` returned it."""
-    view = see(scene)
-    return {name: float(value(view)) for name, (_, value) in sorted(PROPERTIES.items())}
+    lights, (origin, ends, depth) = light_places(scene), _seen(scene)
+    share = (np.arange(_STEPS) + 0.5) / _STEPS
+    points = origin + share[:, None] * (ends - origin)[..., None, :]
+    kinds = [light.kind for light in lights]
+    lamps = {light.name for light in scene.area_lights}
+    balls = [(*_ball(each), _extinction(each.medium)) for each in scene.medium.bounded_media]
+    meshes = [shape for shape in scene.geometry.shapes() if shape.is_mesh() and shape.id() not in lamps]
+    found = {
+        "lights": len(lights),
+        **{f"{kind}s": kinds.count(kind) for kind in ("point", "spot", "directional", "area")},
+        "bounded": len(scene.medium.bounded_media),
+        "optical_depth": optical_depths(balls, _extinction(scene.medium), origin, ends).mean(),
+        "mean_cosine": _mean_cosine(scene),
+        "surface_share": np.isfinite(depth).mean(),
+        "lit_share": np.mean([lit_points(scene.geometry, light, points) for light in lights]),
+        "triangles": sum(shape.face_count() for shape in meshes),
+        "pixels": scene.camera.width * scene.camera.height,
+    }
+    return {name: float(found[name]) for name in sorted(PROPERTIES)}
 
 
-def _count(view: SeenView, kind: str) -> int:
-    return sum(light.kind == kind for light in view.lights)
+def _seen(scene: Scene) -> tuple[Array, Array, Array]:
+    """Return the camera's place, the ends of a grid of its rays, and the depth there.
 
-
-def _light_size(view: SeenView) -> float:
-    """Return the largest half angle at which an area light is seen from the middle of the view [rad]."""
-    areas = [light for light in view.lights if light.kind == "area"]
-    return max(
-        (float(np.arctan2(each.radius, np.linalg.norm(each.place - view.middle))) for each in areas), default=0.0
-    )
-
-
-def _light_nearest(view: SeenView) -> float:
-    """Return the least distance of a light from the camera over the median depth, 100 where all are at infinity."""
-    near = [light.place for light in view.lights if light.kind != "directional"]
-    return min((float(np.linalg.norm(place - view.origin)) / view.median for place in near), default=100.0)
-
-
-def _light_depth(view: SeenView) -> float:
-    """Return the least optical depth from the middle of the view to a light."""
-    directional = [light.kind == "directional" for light in view.lights]
-    places = [
-        view.middle + light.place * view.reach if far else light.place
-        for light, far in zip(view.lights, directional, strict=True)
+    Rays that meet nothing end as far away as all lights and bounds lie.
+    """
+    grid = min(_GRID[0], scene.camera.width), min(_GRID[1], scene.camera.height)
+    camera = read_camera(resized_camera(scene.camera, *grid))
+    across = (0.5 * (camera.width - 1) - np.arange(camera.width))[None, :, None] * camera.left
+    upwards = (0.5 * (camera.height - 1) - np.arange(camera.height))[:, None, None] * camera.up
+    directions = camera.forward + across + upwards
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    depth = distance(scene.geometry, np.broadcast_to(camera.origin, directions.shape), directions)
+    far = [
+        float(np.linalg.norm(light.place - camera.origin))
+        for light in light_places(scene)
+        if light.kind != "directional"
     ]
-    return min(float(optical_depth(view.scene, view.middle, place)) for place in places)
+    for centre, radius in map(_ball, scene.medium.bounded_media):
+        far.append(float(np.linalg.norm(centre - camera.origin)) + radius)
+    far += [float(value) for value in depth[np.isfinite(depth)]]
+    length = np.minimum(depth, 1.5 * max(far, default=1.0))
+    return camera.origin, camera.origin + length[..., None] * directions, depth
+
+
+def _ball(bounded: Any) -> tuple[Array, float]:
+    return np.array(bounded.centre, dtype=np.float64).ravel(), float(bounded.radius[0])
+
+
+def _extinction(medium: Any) -> Array:
+    return np.array([float(sigma_t[0]) for sigma_t in medium.sigma_t])
 
 
 def _mean_cosine(scene: Scene) -> float:
@@ -92,19 +108,3 @@ def _cosine_of(phase: Phase) -> float:
     values = np.array(phase.evaluate(mi.Float(cosine)), dtype=np.float64)
     dr.sync_thread()
     return float(np.sum(weight * values * cosine) / np.sum(weight * values))
-
-
-def _meshes(scene: Scene) -> list:
-    lamps = {light.name for light in scene.area_lights}
-    return [shape for shape in scene.geometry.shapes() if shape.is_mesh() and shape.id() not in lamps]
-
-
-def _silhouettes(view: SeenView) -> float:
-    """Return the silhouette edges of all lights together, 0 where shapes have none."""
-    try:
-        occluders = read_occluders(view.scene.geometry, view.scene.area_lights)
-    except InputError:
-        return 0.0
-    weights = [0.0 if light.kind == "directional" else 1.0 for light in view.lights]
-    ends = [np.append(light.place, weight) for light, weight in zip(view.lights, weights, strict=True)]
-    return float(sum(len(silhouette(occluders, end).edges) for end in ends))

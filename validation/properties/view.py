@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the camera sees of a scene: depths along a grid of rays, and which points on them the lights reach."""
+"""How far rays of a scene go, which points its lights reach, and optical depths, for properties and random scenes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -10,13 +10,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.scene.camera import read_camera, resized_camera
 from realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
 
-GRID = (32, 24)  #: rays across and down the image
-STEPS = 8  #: points on each ray
 _BEFORE = 1e-3  # of its way a shadow ray leaves out at either end
 
 
@@ -37,50 +34,6 @@ class LightPlace:
         way = self.place - points
         distance = np.linalg.norm(way, axis=-1)
         return way / np.maximum(distance, 1e-30)[..., None], distance
-
-
-@dataclass(frozen=True)
-class SeenView:
-    """A grid of camera rays in a scene."""
-
-    scene: Scene
-    lights: tuple[LightPlace, ...]
-    origin: Array  #: (3,) [m]
-    directions: Array  #: unit vectors, (rows, columns, 3)
-    depth: Array  #: distance of the surface, infinite where there is none, (rows, columns) [m]
-    reach: float  #: how far rays without a surface are followed [m]
-
-    @property
-    def lengths(self) -> Array:
-        """Lengths of the rays, (rows, columns) [m]."""
-        return np.minimum(self.depth, self.reach)
-
-    @property
-    def ends(self) -> Array:
-        """Where rays end, (rows, columns, 3) [m]."""
-        return self.origin + self.lengths[..., None] * self.directions
-
-    @property
-    def points(self) -> Array:
-        """Points in the middle of equal steps, (rows, columns, STEPS, 3) [m]."""
-        share = (np.arange(STEPS) + 0.5) / STEPS
-        return self.origin + (self.lengths[..., None] * share)[..., None] * self.directions[:, :, None]
-
-    @cached_property
-    def lit(self) -> NDArray[np.bool_]:
-        """Which of the points each light reaches, (lights, rows, columns, STEPS)."""
-        return np.array([lit_points(self.scene.geometry, light, self.points) for light in self.lights])
-
-    @property
-    def median(self) -> float:
-        """The median length of the rays [m]."""
-        return float(np.median(self.lengths))
-
-    @property
-    def middle(self) -> Array:
-        """A point half of the median length ahead, (3,) [m]."""
-        rows, columns = self.depth.shape
-        return np.asarray(self.origin + 0.5 * self.median * self.directions[rows // 2, columns // 2])
 
 
 def light_places(scene: Scene) -> tuple[LightPlace, ...]:
@@ -104,23 +57,6 @@ def light_places(scene: Scene) -> tuple[LightPlace, ...]:
 
 def _host(vector: Any) -> Array:
     return np.array(vector, dtype=np.float64).ravel()
-
-
-def see(scene: Scene) -> SeenView:
-    """Cast a grid of camera rays; those that meet nothing are followed as far as all lights and bounds lie."""
-    grid = min(GRID[0], scene.camera.width), min(GRID[1], scene.camera.height)
-    camera = read_camera(resized_camera(scene.camera, *grid))
-    across = (0.5 * (camera.width - 1) - np.arange(camera.width))[None, :, None] * camera.left
-    upwards = (0.5 * (camera.height - 1) - np.arange(camera.height))[:, None, None] * camera.up
-    directions = camera.forward + across + upwards
-    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-    depth = distance(scene.geometry, np.broadcast_to(camera.origin, directions.shape), directions)
-    lights = light_places(scene)
-    far = [float(np.linalg.norm(light.place - camera.origin)) for light in lights if light.kind != "directional"]
-    for bounded in scene.medium.bounded_media:
-        far.append(float(np.linalg.norm(_host(bounded.centre) - camera.origin)) + float(bounded.radius[0]))
-    far += [float(value) for value in depth[np.isfinite(depth)]]
-    return SeenView(scene, lights, camera.origin, directions, depth, 1.5 * max(far, default=1.0))
 
 
 def _rays(origin: Array, direction: Array, longest: Array | None = None) -> Any:
@@ -152,24 +88,24 @@ def lit_points(geometry: Any, light: LightPlace, points: Array) -> NDArray[np.bo
     return lit
 
 
-def _mean_extinction(medium: Any) -> float:
-    """Return the mean extinction of the channels [1/m]."""
-    return float(np.mean([float(sigma_t[0]) for sigma_t in medium.sigma_t]))
+def optical_depths(
+    balls: Sequence[tuple[Array, float, Array]], around: Array | float, start: Array, end: Array
+) -> Array:
+    """Return the optical depths of segments by channel, (..., 3); start and end (..., 3) [m].
 
-
-def optical_depth(scene: Scene, start: Array, end: Array) -> Array:
-    """Return the optical depth of segments, the mean of the channels; start and end (..., 3) [m]."""
+    `balls`: centre, radius [m] and extinction, RGB [1/m], of media with bounds; `around`: the extinction between them.
+    """
     way = end - start
-    length = np.linalg.norm(way, axis=-1)
-    outside, depth = length.copy(), np.zeros(length.shape)
-    for bounded in scene.medium.bounded_media:
-        inside = chord(_host(bounded.centre), float(bounded.radius[0]), start, way, length)
+    outside = length = np.linalg.norm(way, axis=-1)
+    depth = np.zeros((*length.shape, 3))
+    for centre, radius, sigma_t in balls:
+        inside = _chord(centre, radius, start, way, length)
         outside = outside - inside
-        depth += inside * _mean_extinction(bounded.medium)
-    return depth + np.maximum(outside, 0) * _mean_extinction(scene.medium)
+        depth += inside[..., None] * sigma_t
+    return np.asarray(depth + np.maximum(outside, 0)[..., None] * around)
 
 
-def chord(centre: Array, radius: float, start: Array, way: Array, length: Array) -> Array:
+def _chord(centre: Array, radius: float, start: Array, way: Array, length: Array) -> Array:
     """Return how much of segments lies in a ball, (...,) [m]: from `start` along `way`, (..., 3), of a length."""
     square = np.maximum(length**2, 1e-30)
     from_centre = start - centre

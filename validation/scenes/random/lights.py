@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validation.scenes.random.design import Draws, Ranges
-from validation.scenes.random.media import Medium, optical_depths, unit_airlight, view_rays
+from validation.scenes.random.media import Medium, depths, unit_airlight, view_rays
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def _ahead(media: list[Medium], camera: Array, axis: Array) -> Array:
     far = float(np.linalg.norm(camera))
     for share in (1.0, 0.83, 0.67, 0.51, 0.37, 0.23, 0.13):
         point = camera + share * far * axis
-        if optical_depths(media, camera, point).mean() < 2:
+        if depths(media, camera, point).mean() < 2:
             return point
     return camera + max(0.07 * far, 1.7 * _CLEAR) * axis
 
@@ -136,7 +136,7 @@ def _nearer(media: list[Medium], camera: Array, ahead: Array, position: Array) -
     """Return a position from which enough light arrives, moved towards a point ahead where needed."""
     for share in (1.0, 0.71, 0.5, 0.35, 0.25, 0.17, 0.11):
         moved = ahead + share * (position - ahead)
-        way = optical_depths(media, moved, ahead).mean() + optical_depths(media, ahead, camera).mean()
+        way = depths(media, moved, ahead).mean() + depths(media, ahead, camera).mean()
         if way < _DEEPEST:
             return moved
     return moved

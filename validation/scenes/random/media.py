@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.phase import phase_from_words
-from validation.properties.view import chord
+from validation.properties.view import optical_depths
 from validation.scenes.random.design import Draws, Ranges
 
 Array = NDArray[np.float64]
@@ -128,21 +128,11 @@ def _bounded(draws: Draws, ranges: Ranges, camera: Array, *, count: int, inside:
     return media
 
 
-def optical_depths(media: list[Medium], start: Array, end: Array) -> Array:
-    """Return the optical depths of segments, (..., 3), by channel, (..., 3), with balls in place of the bounds."""
-    way = end - start
-    length = np.linalg.norm(way, axis=-1)
-    depth = np.zeros((*length.shape, 3))
-    outside = length.copy()
-    for medium in media:
-        if medium.bounds != "unbounded":
-            inside = chord(medium.centre, medium.ball, start, way, length)
-            outside -= inside
-            depth += inside[..., None] * medium.sigma_t
-    for medium in media:
-        if medium.bounds == "unbounded":
-            depth += np.maximum(outside, 0)[..., None] * medium.sigma_t
-    return depth
+def depths(media: list[Medium], start: Array, end: Array) -> Array:
+    """Return the optical depths of segments by channel, (..., 3), with balls in place of the bounds."""
+    balls = [(medium.centre, medium.ball, medium.sigma_t) for medium in media if medium.bounds != "unbounded"]
+    around = [medium.sigma_t for medium in media if medium.bounds == "unbounded"]
+    return optical_depths(balls, around[0] if around else 0.0, start, end)
 
 
 def view_rays(camera: Array, target: Array) -> Array:
@@ -163,10 +153,10 @@ def unit_airlight(media: list[Medium], camera: Array, directions: Array, light: 
     edges = (float(np.linalg.norm(camera)) + 1.0) * (np.arange(_STEPS + 1) / _STEPS) ** 2
     middle, lengths = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     points = camera + middle[:, None] * directions[:, None]
-    left = np.exp(-optical_depths(media, np.broadcast_to(camera, points.shape), points))
+    left = np.exp(-depths(media, np.broadcast_to(camera, points.shape), points))
     toward = light - points
     distance = np.linalg.norm(toward, axis=-1)
-    depth = optical_depths(media, points, np.broadcast_to(light, points.shape))
+    depth = depths(media, points, np.broadcast_to(light, points.shape))
     spread = np.ones_like(distance) if directional else 1 / np.maximum(distance, _NEAR) ** 2
     cosine = -np.sum(toward * directions[:, None], axis=-1) / np.maximum(distance, 1e-12)
     total = np.zeros(points.shape)
