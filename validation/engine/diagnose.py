@@ -35,7 +35,7 @@ from validation.engine.faults import KINDS, faults_of
 from validation.engine.judged_layer import JudgedLayer, judged_layer
 from validation.engine.prediction import Predictor, SceneLight
 from validation.engine.search import Explanation, begin, explain
-from validation.engine.seen import Progress, best_kind, layers_of, pixel_kinds, scene_of_size, seen_image
+from validation.engine.seen import Progress, decide_pixel, layers_of, pixel_kinds, scene_of_size, seen_image
 from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
@@ -179,7 +179,7 @@ def diagnose_image(
         attempt.try_faults(0)
         return attempt
 
-    attempt = best_kind(pixel_kinds(image, pixel), begun, lambda each: each.chosen.error)
+    kind, attempt = decide_pixel(pixel_kinds(image, pixel), begun, lambda found: [each.chosen.error for each in found])
     attempt.go_on()
     chosen, rows = attempt.ranked()
     rest = attempt.rest(chosen)
@@ -187,7 +187,7 @@ def diagnose_image(
         loaded.name,
         path,
         judged.name,
-        attempt.pixel,
+        kind.pixel,
         _first(attempt.right, chosen, bool(rest)),
         tuple(rows[:_SHOWN]),
         attempt.right.error,

@@ -120,9 +120,6 @@ def place_words(predictor: Predictor, explanation: Explanation) -> str:
     for words, angle in _angles(reference):
         if _is_ringed(errors, angle[predictor.pixels]):
             return f"in rings around {words}"
-    corner = np.hypot(column + 0.5 - 0.5 * width, row + 0.5 - 0.5 * height) > 0.4 * math.hypot(width, height)
-    if _lies(size, corner):
-        return "in the corners"
     for high, vertical in enumerate(_PLACES[0]):
         for across, horizontal in enumerate(_PLACES[1]):
             here = (3 * row // height == high) & (3 * column // width == across)

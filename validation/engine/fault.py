@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from validation.engine.prediction import Guess, Layers, Predictor
+from validation.engine.seen import stopped
 from validation.fog_model.radiance import Fog
 
 Array = NDArray[np.float64]
@@ -164,7 +165,7 @@ def traits(predictor: Predictor) -> dict[str, bool]:
         "square": predictor.shape[0] == predictor.shape[1],
         "oblong": predictor.shape[0] != predictor.shape[1],
         "colours": bool(np.ptp(np.nan_to_num(values), axis=1).max() > 1e-6 * np.nanmax(np.abs(values))),
-        "stop": int(np.count_nonzero(values == top(predictor))) >= 8 and top(predictor) > 0,  # of many values
+        "stop": bool(stopped(values).any()),  # of many values
         # More light than there should be: higher orders take none away.
         "more light": float(np.median(predictor.shown(right) - predictor.predicted(right))) > 0,
     }

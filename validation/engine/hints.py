@@ -17,8 +17,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from validation.engine.fault import factor_name
 from validation.engine.faults import FAULTS
+from validation.engine.image_faults import BRIGHTNESS
+from validation.engine.seen import stopped
 from validation.metrics.errors import FLOOR
 
 Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ def _suspects(ref: Array, tst: Array, mean: float) -> tuple[Array, tuple[str, ..
         if not error * GAIN < smallest:  # NaN where no factor fits
             continue
         smallest, corrected, left = error, factor * changed, _rmse(ref, factor * changed)
-        hints = (*words, f"the image is {_brightness(factor)}") if scaled else tuple(words)
+        hints = (*words, _brightness(factor)) if scaled else tuple(words)
     if not hints:
         return corrected, ()
     fall = f"; without {'it' if len(hints) == 1 else 'all that'} the relative rmse is {left / mean:.3g} instead of "
@@ -131,22 +132,18 @@ def _squared_errors(ref: Array, tst: Array) -> Array:
 
 
 def _brightness(factor: float) -> str:
-    """Return how bright an image is that fits when it is multiplied by a factor, with a name for it if it has one."""
+    """Say how bright an image is that fits when it is multiplied by a factor."""
     if factor <= 0:
-        return "negative"
-    times = 1 / factor
-    return f"{times:.4g} times as bright as it should be{factor_name(times)}, {math.log2(times):+.2f} stops"
+        return "the image is negative"
+    return f"{BRIGHTNESS.sentence((1 / factor,))}, {-math.log2(factor):+.2f} stops"
 
 
 def _clipped(ref: Array, tst: Array) -> tuple[str, ...]:
     """Say where values stop at their largest while the reference goes on."""
-    finite = tst[np.isfinite(tst)]
-    top = float(finite.max())
-    stopped = tst == top
-    count = int(stopped.sum())
-    if count < 8 or top <= 0 or not (ref[stopped] > 1.02 * top).mean() > 0.5:
+    values, wanted = tst[stopped(tst)], ref[stopped(tst)]
+    if not len(values) or not (wanted > 1.02 * values[0]).mean() > 0.5:
         return ()
     return (
-        f"{count} values stop at {top:.4g} where the reference goes up to {np.nanmax(ref[stopped]):.4g}: write floats, "
-        "without a tone curve",
+        f"{len(values)} values stop at {values[0]:.4g} where the reference goes up to {np.nanmax(wanted):.4g}: write "
+        "floats, without a tone curve",
     )

@@ -6,7 +6,6 @@ A folder holds SCENE.exr, or SCENE.NAME.exr where several images of a scene are 
 size, which all images of a scene must share, and by the reference that fits, at pixel centres or over their areas.
 """
 
-import difflib
 import json
 import math
 import os
@@ -17,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
+from analytic.errors import InputError, nearest
 from reference.storage.exr import read_exr
 from validation.engine.judge import EngineComparison, ReferenceOf, judge_image
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, judged_layer
@@ -86,7 +85,7 @@ def measure_image(
         layers[SURFACE] = image.layers[SURFACE]
     judged = judge_image(image, layer, loaded, reference_of, path=shown.path, mask=image.with_data())
     both = surfaces and AIRLIGHT in layers and SURFACE in layers
-    return judged, layers, error_metrics(judged.fit.reference.surface, layers[SURFACE]) if both else None
+    return judged, layers, error_metrics(judged.layers.surface, layers[SURFACE]) if both else None
 
 
 def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:
@@ -129,8 +128,7 @@ def _scene_of(path: Path, scenes: Mapping[str, str]) -> str:
     names = [name for name in scenes if stem == name or stem.startswith(f"{name}.")]
     if names:
         return max(names, key=len)
-    near = difflib.get_close_matches(stem.split(".")[0], scenes, n=1, cutoff=0.0)
-    hint = f"; the nearest is {near[0]}" if near else ""
     raise InputError(
-        f"--images: {path} names no scene, wanted SCENE.exr or SCENE.NAME.exr with one of {', '.join(scenes)}{hint}"
+        f"--images: {path} names no scene, wanted SCENE.exr or SCENE.NAME.exr with one of {', '.join(scenes)}"
+        + nearest(stem.split(".")[0], scenes)
     )

@@ -7,7 +7,7 @@ beside a light, by 10 % and more. Only these values can tell the one from the ot
 the reference of either kind and t the image, without the faults of the whole that `hints.py` finds, the error is the
 mean of
 
-    min(|t - r| / max(r, 0.001 mean(r)), 1)
+    |t - r| / max(|t|, |r|, 0.001 mean(r))
 
 which no single value decides, and the kind with the smaller error fits.
 
@@ -41,7 +41,15 @@ from validation.comparison.images import BATCHES, Comparison, compare_images, re
 from validation.engine.error_place import ErrorPlace, error_place
 from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
 from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, judged_layer
-from validation.engine.seen import Progress, pixel_kinds, scene_of_size
+from validation.engine.seen import (
+    PIXELS,
+    PixelKind,
+    Progress,
+    decide_pixel,
+    pixel_kinds,
+    relative_errors,
+    scene_of_size,
+)
 from validation.estimates.agreement import pixel_angle
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer
 from validation.metrics.errors import FLOOR
@@ -86,36 +94,14 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class PixelFit:
-    """The reference that an image is judged by."""
-
-    pixel: str  #: 'centre' or 'area'
-    reference: ReferenceImage
-    hints: Hints
-    centre_error: float | None  #: where the two references differ; None where they were not compared
-    area_error: float | None
-
-    @property
-    def words(self) -> str:
-        """Which kind fits, and how well, or why that was not asked."""
-        kind = "means over the area" if self.pixel == "area" else "centres"
-        if self.centre_error is None or self.area_error is None:
-            return f"judged by {kind}"
-        ours, other = self.centre_error, self.area_error
-        if self.pixel == "area":
-            ours, other = other, ours
-        another = "centres" if self.pixel == "area" else "means over the area"
-        return f"{kind} fit: {100 * ours:.3g} % off where the two differ; {another}: {100 * other:.3g} %"
-
-
-@dataclass(frozen=True)
 class EngineComparison:
     """How far an image from elsewhere is from the reference of a scene."""
 
     scene: str
     path: str
     size: tuple[int, int]  #: width and height [pixels]
-    fit: PixelFit  #: what a pixel of the reference is, and what is wrong with the image as a whole
+    kind: PixelKind  #: what a pixel is, and how well either kind fits where the two references differ
+    hints: Hints  #: what may be wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
     reference_error: (
         float  #: bound of the error of the reference's airlight, with its standard error, relative to its mean
@@ -125,7 +111,8 @@ class EngineComparison:
     verdict: Verdict
     note: str  #: what the reader of the file changed or left out
     margin: float | None  #: largest relative bias that counts as agreement
-    reference: NDArray[np.floating] = field(repr=False, compare=False)  #: what the image was compared with
+    layers: ReferenceImage = field(repr=False, compare=False)  #: the reference that it was judged by, and its layer
+    reference: NDArray[np.floating] = field(repr=False, compare=False)
     image: NDArray[np.floating] = field(repr=False, compare=False)  #: the layer that was judged
 
     @property
@@ -136,12 +123,7 @@ class EngineComparison:
     @property
     def pixel(self) -> str:
         """What a pixel of the reference is: its 'centre' or its 'area'."""
-        return self.fit.pixel
-
-    @property
-    def hints(self) -> Hints:
-        """What may be wrong with the image as a whole."""
-        return self.fit.hints
+        return self.kind.pixel
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -170,7 +152,7 @@ class EngineComparison:
             "factor": plain(self.hints.factor),
             "factor_rmse": plain(self.hints.factor_rmse),
             "hints": list(self.hints.words),
-            "pixel_errors": {"centre": plain(self.fit.centre_error), "area": plain(self.fit.area_error)},
+            "pixel_errors": {kind: plain(self.kind.errors.get(kind)) for kind in PIXELS},
             "where": None if self.place is None else self.place.to_json(),
             "verdict": self.verdict.to_json(),
             "note": self.note,
@@ -184,7 +166,7 @@ class EngineComparison:
         lines = [
             f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; reference: {of}, {pixel}, airlight "
             f"known to {self.reference_error:.2g} of its mean",
-            f"pixels           {self.fit.words}",
+            f"pixels           {self.kind.words}",
             self.comparison.summary(),
         ]
         hints = self.hints
@@ -258,15 +240,15 @@ def judge_image(
     kinds = pixel_kinds(image, pixel)
     if mask is not None and np.shape(mask) == judged.values.shape[:2]:
         judged = replace(judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan))
-    fit = fit_pixel(judged, reference_of, kinds)
+    kind, hints = fitting_kind(judged, reference_of, kinds)
     # Light of another kind says nothing of the pixels: either reference may fit it.
-    other = _other_light(judged, [reference_of(each) for each in (kinds[0], fit.pixel)])
-    fit = replace(fit, hints=replace(fit.hints, words=(*fit.hints.words, *other)))
+    other = _other_light(judged, [reference_of(each) for each in (kinds[0], kind.pixel)])
+    hints, fitting = replace(hints, words=(*hints.words, *other)), reference_of(kind.pixel)
     name, with_errors = judged.name, f"{judged.name}_se" in image.layers
     layers = {name: image.layers[name]} | ({f"{name}_se": image.layers[f"{name}_se"]} if with_errors else {})
-    wanted = expected_layer(fit.reference, judged)
+    wanted = expected_layer(fitting, judged)
     expected = {name: wanted}
-    own_error = reference_error(fit.reference, judged.holds)
+    own_error = reference_error(fitting, judged.holds)
     if with_errors and own_error is not None:
         # Where no path of the image arrived it has no standard error: the reference alone must not judge such a value.
         expected[f"{name}_se"] = np.where(layers[f"{name}_se"] > 0, own_error, 0.0)
@@ -283,14 +265,16 @@ def judge_image(
         scene=loaded.name,
         path=str(path),
         size=judged.size,
-        fit=fit,
+        kind=kind,
+        hints=hints,
         expected=judged.holds,
-        reference_error=relative_bound(fit.reference),
+        reference_error=relative_bound(fitting),
         comparison=comparison,
-        place=error_place(wanted, test, lamp_distance(loaded, fit.reference)),
-        verdict=judge(wanted, test, fit.hints, comparison.failures),
+        place=error_place(wanted, test, lamp_distance(loaded, fitting)),
+        verdict=judge(wanted, test, hints, comparison.failures),
         note=str(image.attributes.get(NOTE, "")),
         margin=margin,
+        layers=fitting,
         reference=wanted,
         image=image.layers[name],
     )
@@ -350,28 +334,24 @@ def _mean_square(values: NDArray[np.floating]) -> float:
     return float(np.mean(finite**2)) if finite.size else math.inf
 
 
-def fit_pixel(image: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]) -> PixelFit:
-    """Return the reference that fits an image.
+def fitting_kind(judged: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]) -> tuple[PixelKind, Hints]:
+    """Return what the pixels of an image are, by the reference that fits it, and what is suspected of it as a whole.
 
     `reference_of`: computes a reference; asked for the means only if the image does not fit the centres to `_EXACT`;
     `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.
     """
-    if len(kinds) == 1:
-        reference = reference_of(kinds[0])
-        return PixelFit(kinds[0], reference, find_hints(expected_layer(reference, image), image.values), None, None)
-    at_centre = reference_of("centre")
-    centre = expected_layer(at_centre, image)
-    hints = find_hints(centre, image.values)
-    if _fits(centre, hints.corrected):
-        return PixelFit("centre", at_centre, hints, None, None)
-    over_area = reference_of("area")
-    area = expected_layer(over_area, image)
-    apart = np.abs(area - centre) > _APART * np.maximum(area, centre)  # an infinite centre counts
-    area_hints = find_hints(area, image.values)
-    errors = _error(centre, hints.corrected, apart), _error(area, area_hints.corrected, apart)
-    if errors[1] < errors[0]:
-        return PixelFit("area", over_area, area_hints, *errors)
-    return PixelFit("centre", at_centre, hints, *errors)
+
+    def attempt(kind: str) -> tuple[Array, Hints]:
+        wanted = expected_layer(reference_of(kind), judged)
+        return wanted, find_hints(wanted, judged.values)
+
+    def errors(found: Sequence[tuple[Array, Hints]]) -> list[float]:
+        (centre, _), (area, _) = found
+        apart = np.abs(area - centre) > _APART * np.maximum(area, centre)  # an infinite centre counts
+        return [_error(wanted, hints.corrected, apart) for wanted, hints in found]
+
+    kind, (_, hints) = decide_pixel(kinds, attempt, errors, lambda found: _fits(found[0], found[1].corrected))
+    return kind, hints
 
 
 def _fits(reference: Array, image: Array) -> bool:
@@ -383,15 +363,11 @@ def _fits(reference: Array, image: Array) -> bool:
 
 def _error(reference: Array, image: Array, where: NDArray[np.bool_]) -> float:
     """Return the error over some values; an infinite reference is wrong by all of it."""
-    finite = np.isfinite(reference)
-    floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
-    chosen = where & np.isfinite(image)
+    finite, chosen = np.isfinite(reference), where & np.isfinite(image)
     if not chosen.any():
         return 0.0
-    wanted, got = reference[chosen], image[chosen]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        relative = np.abs(got - wanted) / np.maximum(wanted, floor)
-    return float(np.mean(np.minimum(np.nan_to_num(relative, nan=1.0), 1.0)))
+    floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
+    return float(np.abs(relative_errors(reference[chosen], image[chosen], floor)).mean())
 
 
 def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str]) -> Verdict:

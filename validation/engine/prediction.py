@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 from reference.monte_carlo.batches import LAYERS
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.read import ReferenceLight, ReferenceScene
-from validation.engine.seen import Seen
+from validation.engine.seen import Seen, relative_errors
 from validation.fog_model.radiance import Fog, FogModel, scene_fog
 from validation.fog_model.view import View
 
@@ -256,11 +256,8 @@ class Predictor:
 
     def errors(self, guess: Guess) -> Array:
         """Return the errors of a guess, relative to the larger of both values, (m, 3), from -1 to 1."""
-        predicted, shown = self.predicted(guess), self.shown(guess)
-        scale = np.maximum(np.maximum(np.abs(shown), np.abs(predicted)), self._floor(shown))
-        with np.errstate(invalid="ignore"):
-            errors = (shown - predicted) / scale
-        return np.where(np.isfinite(errors), errors, 1.0)
+        shown = self.shown(guess)
+        return relative_errors(self.predicted(guess), shown, self._floor(shown))
 
     def lit(self, guess: Guess) -> Bools:
         """Return which values of the image are not dark, (m, 3): the others have no noise that could be seen."""

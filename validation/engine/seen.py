@@ -2,8 +2,8 @@
 """An image that is to be explained: its values, which pixels take part, and what a fog makes of these."""
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -34,6 +34,7 @@ PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre,
 _MOST_RAYS = 3200  # every pixel of an image of 64 x 48
 _FEWEST = 64  # pixels, whatever rays they need
 _FEW = 4  # pixels that values may be cut off in, and that are looked at: chance may meet none of them
+_STOPPED = 8  # values
 _SIDE = 3  # rays along a side of a pixel, for means over its area
 _MOST_SAMPLES = 128  # of an area light
 _SETTLED = 0.005  # mean relative change of an image with twice the samples, below which there are enough
@@ -71,10 +72,8 @@ class Seen:
 
     @cached_property
     def cut_off(self) -> Index:
-        """The pixels at the largest value, if several share it, as values do that are cut off there, (n,)."""
-        most = self.values[self.used].max(initial=0.0)
-        pixels = np.flatnonzero(self.used & (self.values == most).any(axis=1))
-        return pixels if most > 0 and len(pixels) >= _FEW else pixels[:0]
+        """The pixels with values that are cut off, (n,)."""
+        return np.flatnonzero(stopped(np.where(self.used[:, None], self.values, np.nan)).any(axis=1))
 
     def model(self, view: View, lights: tuple[ReferenceLight, ...] | None = None, **how: Any) -> FogModel:
         """Return the paths of the light that the image holds; `how`: see `scattering_paths`."""
@@ -96,6 +95,13 @@ class Seen:
             (pixels % self.reference.width + apart < self.reference.width) & (partners < len(self.used))
         ]
         return np.asarray(np.union1d(pixels, partners[self.used[partners]]), dtype=np.int64)
+
+
+def stopped(values: Array) -> Bools:
+    """Return which values stop, with seven others at least, at the largest one, as those do that are cut off there."""
+    most = values[np.isfinite(values)].max(initial=0.0)
+    found = values == most
+    return np.asarray(found if most > 0 and np.count_nonzero(found) >= _STOPPED else np.zeros_like(found))
 
 
 def _evenly(count: int, fraction: float) -> Index:
@@ -165,16 +171,50 @@ def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
     return ("area",) if "airlight:spp" in image.attributes else PIXELS
 
 
-def best_kind(
-    kinds: Sequence[str], attempt: Callable[[str], Found], error: Callable[[Found], float], exact: float = 0.0
-) -> Found:
-    """Return the attempt at an image that leaves least of all kinds of pixels; one that leaves `exact` is the last."""
+@dataclass(frozen=True)
+class PixelKind:
+    """What the pixels of an image are."""
+
+    pixel: str  #: 'centre' or 'area'
+    errors: Mapping[str, float] = field(default_factory=dict)  #: mean relative ones by kind, if several were compared
+
+    @property
+    def words(self) -> str:
+        """Which kind fits, and how well, or why that was not asked."""
+        names = {"centre": "centres", "area": "means over the area"}
+        if not self.errors:
+            return f"judged by {names[self.pixel]}"
+        own, other = (f"{100 * self.errors[kind]:.3g} % off" for kind in sorted(PIXELS, key=self.pixel.__ne__))
+        another = next(names[kind] for kind in PIXELS if kind != self.pixel)
+        return f"{names[self.pixel]} fit: {own} where the two differ; {another}: {other}"
+
+
+def decide_pixel(
+    kinds: Sequence[str],
+    attempt: Callable[[str], Found],
+    errors: Callable[[Sequence[Found]], Sequence[float]],
+    exact: Callable[[Found], bool] = lambda found: False,
+) -> tuple[PixelKind, Found]:
+    """Return what the pixels of an image are, and the attempt at it that takes them for that.
+
+    `kinds`: what they may be, see `pixel_kinds`; `errors`: what is left by attempts, which are compared where there are
+    several; `exact`: whether one leaves so little that no other can leave less.
+    """
     found: list[Found] = []
     for kind in kinds:
         found.append(attempt(kind))
-        if error(found[-1]) < exact:
-            break
-    return min(found, key=error)
+        if len(kinds) == 1 or exact(found[-1]):
+            return PixelKind(kind), found[-1]
+    left = dict(zip(kinds, errors(found), strict=True))
+    pixel = min(left, key=left.__getitem__)
+    return PixelKind(pixel, left), found[kinds.index(pixel)]
+
+
+def relative_errors(predicted: Array, shown: Array, floor: float) -> Array:
+    """Return the errors of values relative to the larger of both, or to a floor; 1 where one is not finite."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        errors = (shown - predicted) / np.maximum(np.maximum(np.abs(shown), np.abs(predicted)), floor)
+    return np.where(np.isfinite(errors), errors, 1.0)
 
 
 def needed_samples(reference: ReferenceScene) -> int:

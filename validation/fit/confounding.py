@@ -114,7 +114,7 @@ def confounded(
     names = {number: unknowns[number].name for number in group.members}
     products = []
     for kept, powers in group.powers.items():
-        if all(unknowns[number].scale.relative for number in (kept, *powers)):
+        if all(unknowns[number].scale == "log" for number in (kept, *powers)):
             words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
             middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
             low, high = (float(np.exp(middle + float(length))) for length in lengths[kept])

@@ -2,6 +2,7 @@
 """The parameters of the fog that explain an image file of a scene, with their intervals."""
 
 import math
+import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -14,7 +15,16 @@ from analytic.errors import InputError
 from reference.storage.exr import Image
 from validation.columns import plain
 from validation.engine.judged_layer import judged_layer
-from validation.engine.seen import Progress, Seen, at_places, best_kind, pixel_kinds, seen_image
+from validation.engine.seen import (
+    Progress,
+    Seen,
+    at_places,
+    decide_pixel,
+    pixel_kinds,
+    relative_errors,
+    seen_image,
+    stopped,
+)
 from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
 from validation.fit.solve import (
     SIGMAS,
@@ -26,8 +36,9 @@ from validation.fit.solve import (
     robust_fit,
     weighted_fit,
 )
-from validation.fit.unknowns import AXES, CHANNELS, Unknown, read_unknowns
+from validation.fit.unknowns import Unknown, read_unknowns
 from validation.fog_model.radiance import scene_fog
+from validation.metrics.errors import FLOOR
 from validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
@@ -40,8 +51,8 @@ _EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
 _FEW_RAYS = 3000  # on which starts are compared
 _FEWER = 4
 _FEWEST = 16  # pixels
-_SATURATED = 8  # values that stop at the largest one
 _MANY = 0.1  # fraction of the pixels: if more are left out, the reader should look why
+_CHANNEL = re.compile(r"^([^:]*)\.[rgb](?=:|$)")  # of the name of a parameter, which a medium may follow
 _BAD = 0.99  # fraction of the variance: an image that is explained less is not understood
 
 
@@ -153,7 +164,7 @@ def fit_image(
     judged = judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene, mask=mask)
     unknowns = read_unknowns(parameters, seen.reference, scene_fog(seen.reference), starts or {})
-    seen = replace(seen, used=seen.used & ~_cut_off(seen))
+    seen = replace(seen, used=seen.used & ~stopped(np.where(seen.used[:, None], seen.values, np.nan)).any(axis=1))
     fewest = max(_FEWEST, 4 * len(unknowns))
     if int(seen.used.sum()) < fewest:
         raise InputError(
@@ -161,23 +172,15 @@ def fit_image(
             f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )
 
-    def solved(kind: str) -> tuple[str, ImageModel, tuple[Group, ...], Solution, tuple[Unknown, ...]]:
+    def solved(kind: str) -> tuple[ImageModel, tuple[Group, ...], Solution, tuple[Unknown, ...]]:
         tell = None if progress is None else _stage(progress, kinds.index(kind), len(kinds))
-        return kind, *_solved(replace(seen, area=kind == "area"), unknowns, tell)
+        return _solved(replace(seen, area=kind == "area"), unknowns, tell)
 
-    kind, model, groups, solution, unknowns = best_kind(kinds, solved, lambda each: _wrong(each[3]), _EXACT)
-    fit = _fit((loaded.name, path, judged.holds, kind), model, groups, solution, unknowns)
+    kind, (model, groups, solution, unknowns) = decide_pixel(
+        kinds, solved, lambda found: [_wrong(each[2]) for each in found], lambda each: _wrong(each[2]) < _EXACT
+    )
+    fit = _fit((loaded.name, path, judged.holds, kind.pixel), model, groups, solution, unknowns)
     return replace(fit, seconds=time.perf_counter() - started, failures=wrong)
-
-
-def _cut_off(seen: Seen) -> NDArray[np.bool_]:
-    """Return which pixels stop, with many others, at the largest value."""
-    if not seen.used.any():
-        return seen.used
-    largest = seen.values[seen.used].max()
-    stopped = seen.used & np.any(seen.values == largest, axis=1)
-    many = largest > 0 and np.count_nonzero(stopped) >= _SATURATED
-    return np.asarray(stopped if many else np.zeros_like(stopped))
 
 
 def _stage(progress: Progress, number: int, count: int) -> Progress:
@@ -201,7 +204,7 @@ def _solved(
     groups = confounded_groups(derivatives.reshape(-1, len(unknowns)))
     held = {number for group in groups for number in group.held}
     free = [number for number in range(len(unknowns)) if number not in held]
-    given = {number: unknowns[number].scale.inward(unknowns[number].start) for number in held}
+    given = {number: unknowns[number].inward(unknowns[number].start) for number in held}
     if not free:
         return model, groups, no_solution(model), unknowns
     inner = start[free]
@@ -219,7 +222,7 @@ def _solved(
             break
         outward = [unknown.start for unknown in unknowns]
         for number, value in zip(free, inner, strict=True):
-            outward[number] = unknowns[number].scale.outward(float(value))
+            outward[number] = unknowns[number].outward(value)
         seen, unknowns = _moved(seen, unknowns, outward)
         model = ImageModel.of(seen)
     return fixed, groups, solution, unknowns
@@ -237,7 +240,8 @@ def _moved(seen: Seen, unknowns: Sequence[Unknown], values: Sequence[float]) -> 
     moved = list(unknowns)
     for row, (unknown, value) in enumerate(zip(unknowns, values, strict=True)):
         if unknown.moves:
-            places[unknown.number][AXES.index(unknown.kind[-1])] = value
+            _, light, axis = unknown.paths[0]
+            places[int(light)][int(axis)] = value
             moved[row] = replace(unknown, place=value)
     return at_places(seen, {number: (x, y, z) for number, (x, y, z) in places.items()}), tuple(moved)
 
@@ -246,7 +250,7 @@ def _holding(model: ImageModel, unknowns: Sequence[Unknown], given: Mapping[int,
     """Return the model with parameters held."""
     fog = model.fog
     for number, inner in given.items():
-        fog = unknowns[number].put(fog, unknowns[number].scale.outward(inner))
+        fog = unknowns[number].put(fog, unknowns[number].outward(inner))
     return replace(model, fog=fog)
 
 
@@ -258,8 +262,8 @@ def _left(solution: Solution) -> Array:
 
 def _wrong(solution: Solution) -> float:
     """Return how far values are off, as `validation.engine.judge` does: no single one decides."""
-    left = _left(solution)
-    return float(np.minimum(left, 1.0).mean()) if left.size else math.inf
+    floor, image = FLOOR * float(np.abs(solution.radiance).mean()), solution.radiance + solution.residual
+    return float(np.abs(relative_errors(solution.radiance, image, floor)).mean()) if image.size else math.inf
 
 
 def _fit(
@@ -275,11 +279,11 @@ def _fit(
     known = [unknowns[number] for number in free]
     reach = interval_ends(model, known, solution) - solution.inner[:, None]
     lengths = dict(zip(free, np.copysign(np.hypot(reach, SIGMAS * _KNOWN), [-1, 1]), strict=True))
-    inner = {number: unknowns[number].scale.inward(unknowns[number].start) for number in held}
+    inner = {number: unknowns[number].inward(unknowns[number].start) for number in held}
     inner |= dict(zip(free, (float(value) for value in solution.inner), strict=True))
     rows = []
     for number, unknown in enumerate(unknowns):
-        outward = unknown.scale.outward
+        outward = unknown.outward
         ends: tuple[float | None, float | None] = (None, None)
         if number not in doubtful:
             low, high = inner[number] + lengths[number]
@@ -311,17 +315,10 @@ def _by_name(unknowns: Sequence[Unknown]) -> tuple[tuple[str, tuple[int, ...]], 
     """Return the rows that JSON shows together: three channels that stand for one word."""
     names: dict[str, list[int]] = {}
     for number, unknown in enumerate(unknowns):
-        names.setdefault(_whole(unknown), []).append(number)
-    # A channel that was asked for by itself keeps its name.
-    whole = {name: rows for name, rows in names.items() if len(rows) == 3 or len(unknowns[rows[0]].channels) == 3}
-    ordered = [(name, tuple(rows)) for name, rows in whole.items()]
-    taken = {number for rows in whole.values() for number in rows}
-    ordered += [(unknown.name, (number,)) for number, unknown in enumerate(unknowns) if number not in taken]
-    return tuple(sorted(ordered, key=lambda entry: entry[1]))
-
-
-def _whole(unknown: Unknown) -> str:
-    word, colon, place = unknown.name.partition(":")
-    if len(unknown.channels) == 1:
-        word = word.removesuffix(f".{CHANNELS[unknown.channels[0]]}")
-    return word + colon + place
+        names.setdefault(_CHANNEL.sub(r"\1", unknown.name), []).append(number)
+    rows: list[tuple[str, tuple[int, ...]]] = []
+    for name, numbers in names.items():
+        # A channel that was asked for by itself keeps its name.
+        together = len(numbers) == 3 or name == unknowns[numbers[0]].name
+        rows += [(name, tuple(numbers))] if together else [(unknowns[number].name, (number,)) for number in numbers]
+    return tuple(sorted(rows, key=lambda entry: entry[1]))

@@ -178,7 +178,7 @@ def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float,
     The extinctions are those to begin with and, where these differ from one another, their mean: channels whose starts
     lie decades apart lead to no common end.
     """
-    given = np.array([unknown.scale.inward(unknown.start) for unknown in unknowns])
+    given = np.array([unknown.inward(unknown.start) for unknown in unknowns])
     sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind.startswith("sigma")]
     gs = [n for n, unknown in enumerate(unknowns) if unknown.kind == "phase.g"]
     factors = [n for n, unknown in enumerate(unknowns) if unknown.kind in _FACTORS]

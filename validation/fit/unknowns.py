@@ -23,6 +23,7 @@ step is a relative change.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,28 +36,33 @@ from validation.fog_model.view import light_sources
 
 CHANNELS = ("r", "g", "b")
 AXES = ("x", "y", "z")
-NAMES = ("sigma_t", "albedo", "phase.g", "intensity", "light.x", "light.y", "light.z", "exposure")
 LAYERS = ("sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2", "sigma_0")  #: of height fog, as scenes have them
 _PARTS = {"sigma": "sigma_t", "z": "base", "H": "scale_height"}  # of a layer of height fog, by the letters of a scene
 
+Path = tuple[str | int, ...]  #: of a number in a fog: fields, and numbers in tuples
 
 # Of the start of a search: a factor of 22 000, or an artanh g of 10. An image that asks for more says nothing, and a
 # step that is not bounded may ask for a factor that no number holds.
 _FARTHEST = 10.0
 
 
-@dataclass(frozen=True)
-class Scale:
-    """How a parameter is looked for: as a number on the whole line."""
-
-    inward: Callable[[float], float]
-    outward: Callable[[float], float]
-    relative: bool  #: whether a step is a relative change, so that products of such parameters make sense
-
-
-_LOG = Scale(math.log, lambda value: float(np.exp(value)), relative=True)
-_TANH = Scale(math.atanh, math.tanh, relative=False)
-_PLAIN = Scale(float, float, relative=False)
+# How parameters are looked for, as numbers on the whole line: to there, and back.
+_SCALES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
+    "log": (math.log, lambda value: float(np.exp(value))),
+    "tanh": (math.atanh, math.tanh),
+    "plain": (float, float),
+}
+_BY_LETTERS = {"sigma": ("log", "1/m"), "z": ("plain", "m"), "H": ("log", "m")}
+_KINDS = {
+    "sigma_t": ("log", "1/m"),
+    "albedo": ("log", "1"),
+    "phase.g": ("tanh", "1"),
+    "intensity": ("log", "1"),
+    **{f"light.{axis}": ("plain", "m") for axis in AXES},
+    "exposure": ("log", "1"),
+    **{name: _BY_LETTERS[name[:-2]] for name in LAYERS},
+}
+NAMES = tuple(_KINDS)[: -len(LAYERS)]  #: of the parameters of homogeneous media
 
 
 @dataclass(frozen=True)
@@ -64,44 +70,61 @@ class Unknown:
     """A parameter that is looked for."""
 
     name: str  #: as the user calls it
-    kind: str  #: of `NAMES`
-    number: int  #: of the medium or light
-    channels: tuple[int, ...]  #: which it is about
+    kind: str  #: of `NAMES` or `LAYERS`
+    paths: tuple[Path, ...]  #: the numbers of a fog that it stands for
     scene: float  #: value in the scene
-    scale: Scale
-    unit: str
     start: float = math.nan  #: value to begin with
     place: float = math.nan  #: of a position: where the paths begin [m]
 
     def put(self, fog: Fog, value: float) -> Fog:
         """Return the fog with a value of this parameter."""
-        if self.kind in ("sigma_t", "albedo"):
-            old = getattr(fog, self.kind)[self.number]
-            new = tuple(value if channel in self.channels else old[channel] for channel in range(3))
-            return fog.with_entry(self.kind, self.number, new)
-        if self.kind == "phase.g":
-            return fog.with_entry("phase", self.number, value)
-        if self.kind == "intensity":
-            return fog.with_entry("intensity", self.number, value)
-        if self.kind == "exposure":
-            red, green, blue = (value if c in self.channels else fog.exposure[c] for c in range(3))
-            return replace(fog, exposure=(red, green, blue))
-        if self.kind in LAYERS:
-            return replace(fog, height=_with_layer(fog.height, self.kind, value))
-        axis = AXES.index(self.kind[-1])
-        place = fog.moved[self.number]
-        new_place = tuple(value - self.place if each == axis else place[each] for each in range(3))
-        return fog.with_entry("moved", self.number, new_place)
+        for path in self.paths:
+            fog = _put(fog, path, value - self.place if self.moves else value)
+        return fog
+
+    @property
+    def scale(self) -> str:
+        """How it is looked for: of 'log' a step is a relative change, so that products make sense."""
+        return _KINDS[self.kind][0]
+
+    def inward(self, value: float) -> float:
+        """Return the number on the whole line that a value is looked for as."""
+        return _SCALES[self.scale][0](value)
+
+    def outward(self, number: float) -> float:
+        """Return the value that a number on the whole line stands for."""
+        return _SCALES[self.scale][1](float(number))
+
+    @property
+    def unit(self) -> str:
+        """The unit of its value."""
+        return _KINDS[self.kind][1]
 
     @property
     def farthest(self) -> float:
         """How far from its start it is looked for, as a number on the whole line; see `_FARTHEST`."""
-        return math.inf if self.scale is _PLAIN else _FARTHEST
+        return math.inf if self.scale == "plain" else _FARTHEST
 
     @property
     def moves(self) -> bool:
         """Whether it moves a light, and shadows with it."""
         return self.kind.startswith("light.")
+
+
+def _put(whole: Any, path: Path, value: float) -> Any:
+    if not path:
+        return value
+    first, rest = path[0], path[1:]
+    if isinstance(first, str):
+        return replace(whole, **{first: _put(getattr(whole, first), rest, value)})
+    return (*whole[:first], _put(whole[first], rest, value), *whole[first + 1 :])
+
+
+def _number(fog: Fog, path: Path) -> float:
+    found: Any = fog
+    for part in path:
+        found = getattr(found, part) if isinstance(part, str) else found[part]
+    return float(found)
 
 
 def read_unknowns(
@@ -115,12 +138,11 @@ def read_unknowns(
     if not names:
         raise InputError(f"fit: got none, wanted some of {', '.join(NAMES)}")
     unknowns = tuple(unknown for name in names for unknown in _read(name, reference, fog))
-    seen: set[tuple[str, int, int]] = set()
+    seen: set[Path] = set()
     for unknown in unknowns:
-        places = {(unknown.kind, unknown.number, channel) for channel in unknown.channels}
-        if places & seen:
+        if seen & set(unknown.paths):
             raise InputError(f"fit: '{unknown.name}' is there twice; name each parameter once")
-        seen |= places
+        seen |= set(unknown.paths)
     for name in starts:
         if name not in {unknown.name for unknown in unknowns}:
             known = [unknown.name for unknown in unknowns]
@@ -133,40 +155,36 @@ def read_unknowns(
 def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[float] | NDArray[np.float64]) -> Fog:
     """Return the fog with the values of parameters, given as numbers on the whole line."""
     for unknown, value in zip(unknowns, inner, strict=True):
-        fog = unknown.put(fog, unknown.scale.outward(float(value)))
+        fog = unknown.put(fog, unknown.outward(value))
     return fog
 
 
 def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
     word, _, place = name.partition(":")
-    kind, channels = word, tuple(range(3))
-    for channel, letter in enumerate(CHANNELS):
-        base = word.removesuffix(f".{letter}")
-        if base in ("sigma_t", "albedo", "exposure") and base != word:
-            kind, channels = base, (channel,)
+    base, _, letter = word.rpartition(".")
+    alone = base in ("sigma_t", "albedo", "exposure") and letter in CHANNELS
+    kind, channels = (base, (CHANNELS.index(letter),)) if alone else (word, (0, 1, 2))
     if fog.height is None and kind in LAYERS:
         raise InputError(f"fit: got '{name}'; the scene has no height fog: write it as such, or look for 'sigma_t'")
     names = NAMES if fog.height is None else (*_layers_of(fog.height), *NAMES[1:])
     if kind not in names:
         raise InputError(f"fit: got '{name}', wanted some of {', '.join(names)}" + nearest(word, names))
-    if fog.height is not None and kind in LAYERS:
-        return [_of_layer(kind, fog.height)]
+    if kind in LAYERS:
+        part, number = kind.split("_")
+        path: Path = ("height", "layers", int(number) - 1, _PARTS[part]) if number != "0" else ("height", "constant")
+        return [Unknown(kind, kind, (path,), _number(fog, path))]
     if kind == "exposure":
         if place:
             raise InputError(f"fit: got '{name}'; the exposure is that of the whole image: write '{word}'")
-        return [Unknown(name, kind, 0, channels, 1.0, _LOG, "1")]
+        return [Unknown(name, kind, tuple((kind, channel) for channel in channels), 1.0)]
     if kind in ("sigma_t", "albedo", "phase.g"):
-        return [
-            each
-            for number in _media(name, place, reference, fog)
-            for each in _of_medium(kind, channels, number, reference, fog)
-        ]
+        numbers = _media(name, place, reference, fog)
+        return [each for number in numbers for each in _of_medium(kind, channels, number, reference, fog)]
     return [_of_light(kind, number, reference) for number in _lights(name, place, kind, reference)]
 
 
 def _of_medium(kind: str, channels: tuple[int, ...], number: int, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
-    several = len(_scattering(fog)) > 1
-    ending = f":{_medium_name(number, reference)}" if several else ""
+    ending = f":{_medium_name(number, reference)}" if len(_scattering(fog)) > 1 else ""
     if kind == "phase.g":
         phase = (reference.medium, *reference.media)[number].phase
         if not phase.is_constant and phase.name != "hg":
@@ -174,20 +192,15 @@ def _of_medium(kind: str, channels: tuple[int, ...], number: int, reference: Ref
                 f"fit: 'phase.g' is for the phase functions 'hg' and 'isotropic'; this medium has '{phase.name}'"
             )
         own = fog.phase[number]
-        g = own if isinstance(own, float) else 0.0
-        return [Unknown(kind + ending, kind, number, (0, 1, 2), g, _TANH, "1")]
+        return [Unknown(kind + ending, kind, (("phase", number),), own if isinstance(own, float) else 0.0)]
     values = getattr(fog, kind)[number]
-    unit = "1/m" if kind == "sigma_t" else "1"
     groups = [channels] if len({values[c] for c in channels}) == 1 else [(channel,) for channel in channels]
     return [
         Unknown(
             kind + (f".{CHANNELS[group[0]]}" if len(group) == 1 else "") + ending,
             kind,
-            number,
-            group,
+            tuple((kind, number, channel) for channel in group),
             values[group[0]],
-            _LOG,
-            unit,
         )
         for group in groups
     ]
@@ -197,33 +210,16 @@ def _of_light(kind: str, number: int, reference: ReferenceScene) -> Unknown:
     names = light_names(reference)
     name = kind + (f":{names[number]}" if len(names) > 1 else "")
     if kind == "intensity":
-        return Unknown(name, kind, number, (0, 1, 2), 1.0, _LOG, "1")
+        return Unknown(name, kind, ((kind, number),), 1.0)
     if number >= len(reference.lights):
         raise InputError(f"fit: got '{name}', wanted the position of a point or spot light")
-    return Unknown(
-        name, kind, number, (0, 1, 2), float(reference.lights[number].position[AXES.index(kind[-1])]), _PLAIN, "m"
-    )
-
-
-def _of_layer(kind: str, height: HeightFog) -> Unknown:
-    part, number = kind.split("_")
-    value = height.constant if number == "0" else getattr(height.layers[int(number) - 1], _PARTS[part])
-    return Unknown(kind, kind, 0, (0, 1, 2), value, _PLAIN if part == "z" else _LOG, "1/m" if part == "sigma" else "m")
+    axis = AXES.index(kind[-1])
+    return Unknown(name, kind, (("moved", number, axis),), float(reference.lights[number].position[axis]))
 
 
 def _layers_of(height: HeightFog) -> tuple[str, ...]:
     """Return the names of the numbers that height fog has."""
     return tuple(name for name in LAYERS if 0 < int(name[-1]) <= len(height.layers) or name == "sigma_0")
-
-
-def _with_layer(height: HeightFog | None, kind: str, value: float) -> HeightFog:
-    assert height is not None
-    part, number = kind.split("_")
-    if number == "0":
-        return replace(height, constant=value)
-    layers = list(height.layers)
-    layers[int(number) - 1] = replace(layers[int(number) - 1], **{_PARTS[part]: value})
-    return replace(height, layers=tuple(layers))
 
 
 def _scattering(fog: Fog) -> list[int]:
@@ -271,14 +267,14 @@ def _started(unknown: Unknown, starts: Mapping[str, float]) -> Unknown:
     value = starts.get(unknown.name, unknown.scene)
     fits = math.isfinite(value)
     wanted = "a finite number"
-    if unknown.scale is _LOG:
+    if unknown.scale == "log":
         fits, wanted = fits and value > 0, "a number above 0"
         if unknown.name not in starts and value <= 0:
             raise InputError(
                 f"fit: '{unknown.name}' is {value:g} in the scene, where nothing can begin; give start "
                 f"{unknown.name}=VALUE"
             )
-    if unknown.scale is _TANH:
+    if unknown.scale == "tanh":
         fits, wanted = -1 < value < 1, "a number between -1 and 1"
     if not fits:
         raise InputError(f"start: {unknown.name}={value:g}, wanted {wanted}")

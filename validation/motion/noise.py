@@ -29,7 +29,7 @@ is filtered. The blur gain is the root mean square of n after a Gaussian of devi
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,7 @@ from analytic.errors import InputError
 from reference.storage.exr import read_exr
 from validation.columns import plain
 from validation.engine.images import image_times
-from validation.engine.judge import references, relative_bound
+from validation.engine.judge import fitting_kind, references, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import Progress, pixel_kinds, scene_of_size
 from validation.motion.blocks import Estimate, parts_of_error, told
@@ -308,7 +308,7 @@ def compare_runs(
     """Compare independent renders of a frame with the reference of its scene.
 
     `pattern`: the EXR files, # for each digit of their numbers; the rest as of `validation.engine.judge.compare_scene`.
-    Where files do not say what a pixel is, the kind that their mean is nearer to is taken.
+    Where files do not say what a pixel is, the kind that fits their mean is taken.
     """
     paths = run_paths(pattern)
     images = [read_exr(path) for path in paths]
@@ -324,11 +324,10 @@ def compare_runs(
     runs = np.array([each.values for each in layers], dtype=np.float64)
     finite = np.isfinite(runs).all(axis=0)
 
-    def distance(kind: str) -> float:
-        return float(np.mean((runs.mean(axis=0) - expected_layer(reference_of(kind), first))[finite] ** 2))
-
-    kind = min(pixel_kinds(images[0], pixel), key=distance)
-    reference = expected_layer(reference_of(kind), first)
+    mean = replace(first, values=np.where(finite, runs, np.nan).mean(axis=0))
+    kind, _ = fitting_kind(mean, reference_of, pixel_kinds(images[0], pixel))
+    fitting = reference_of(kind.pixel)
+    reference = expected_layer(fitting, first)
     time = image_times(paths[0])
     filled = list(np.where(finite, runs, reference))
     return NoiseComparison(
@@ -336,8 +335,8 @@ def compare_runs(
         pattern=str(pattern),
         size=first.size,
         layer=first,
-        pixel=kind,
-        reference_error=relative_bound(reference_of(kind)),
+        pixel=kind.pixel,
+        reference_error=relative_bound(fitting),
         noise=measure_noise(reference, filled, None if time is None else time[0].median_ms / 1e3),
         nonfinite=int((~finite).sum()),
         device="" if time is None or not time[1] else f"on {time[1]}",

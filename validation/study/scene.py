@@ -352,7 +352,7 @@ def measured_image(
         surface_error=surface,
         times=None if times is None else FrameTimes(times[0]),
     )
-    reference, whole = judged.fit.reference, None
+    reference, whole = judged.layers, None
     if judged.expected == TOTAL:
         whole = judged.reference
     elif "surface" in layers or not np.any(reference.surface > 0):

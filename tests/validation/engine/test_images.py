@@ -109,7 +109,7 @@ def test_the_reference_that_fits_is_taken(variant, tmp_path):
         judged, *_ = measured(path)
         assert (judged.pixel, "means over the areas" in notes_of(judged, None)) == (pixel, pixel == "area")
         assert judged.comparison.metrics.relative_bias == pytest.approx(-0.001, abs=1e-6)
-        np.testing.assert_array_equal(judged.fit.reference.airlight, reference.airlight)
+        np.testing.assert_array_equal(judged.layers.airlight, reference.airlight)
 
 
 def test_an_engine_says_how_long_its_images_took(variant, tmp_path):

@@ -179,7 +179,7 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
     model = ImageModel.of(Seen(reference, np.zeros((count, 3)), "airlight", np.ones(count, bool)))
     clean = model.radiance(fog)
     generator = np.random.default_rng(5)
-    wanted = np.array([unknown.scale.inward(unknown.scene) for unknown in unknowns])
+    wanted = np.array([unknown.inward(unknown.scene) for unknown in unknowns])
     covered = np.zeros(len(unknowns))
     for _ in range(trials):
         noisy = {
