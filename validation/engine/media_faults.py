@@ -4,7 +4,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -93,12 +92,7 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 def _between(spherical: bool, end: str, at: float | None = None) -> Change:
     """Return what lets the medium begin or end at a distance, one that is given or a number of the fault."""
-
-    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-        given: dict[str, Any] = {end: short(p[0]) if at is None else at, "spherical": spherical}
-        return replace(guess, fog=replace(guess.fog, **given), scenery=replace(guess.scenery, **given))
-
-    return changed
+    return changed_fog(lambda fog, *p: replace(fog, **{end: short(p[0]) if at is None else at, "spherical": spherical}))
 
 
 def _depths(predictor: Predictor, guess: Guess) -> Sequence[Values]:
@@ -162,13 +156,8 @@ def _heights(predictor: Predictor, guess: Guess) -> Sequence[Values]:
     return [(size * part, factor) for part in (0.1, 0.3, 1.0) for factor in (1.0, 2.0)]
 
 
-def _depth_for_distance(*what: str, march: bool = False) -> Change:
-    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-        fog = replace(guess.fog, planar=guess.fog.planar | set(what))
-        surfaces = guess.surfaces or guess.scenery
-        return replace(guess, fog=fog, scenery=replace(guess.scenery, planar=march), surfaces=surfaces)
-
-    return changed
+def _depth_for_distance(*what: str) -> Change:
+    return changed_fog(lambda fog: replace(fog, planar=fog.planar | set(what)))
 
 
 def _multiple(of_surfaces: bool) -> Change:
@@ -319,7 +308,7 @@ MEDIUM = (
             needs=needs,
         )
         for where, change, needs in (
-            ("in the attenuation and where rays end", _depth_for_distance("surfaces", march=True), ("fog",)),
+            ("in the attenuation and where rays end", _depth_for_distance("surfaces", "ends"), ("fog",)),
             ("in the attenuation", _depth_for_distance("nodes", "surfaces"), ("shapes",)),
             (
                 "in the attenuation and the steps of the march",

@@ -15,7 +15,7 @@ from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.read import ReferenceLight, ReferenceScene
 from validation.engine.seen import Seen, relative_errors
 from validation.fog_model.radiance import Fog, FogModel, scene_fog
-from validation.fog_model.view import View
+from validation.fog_model.view import Ends, View
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -43,10 +43,6 @@ class Scenery:
     edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
     radius: float = 0.0  #: of spheres in the place of point lights [m]
     blend: float = 0.0  #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
-    near: float = 0.0  #: nodes begin at this plane before the camera [m]
-    far: float = np.inf  #: and end at this one [m]
-    spherical: bool = False  #: whether both are distances from the camera
-    planar: bool = False  #: whether nodes end at the distance along the ray that is the depth of the surface
 
     @property
     def where(self) -> dict[str, Any]:
@@ -67,17 +63,12 @@ class Scenery:
             lights.append(light)
         return tuple(lights)
 
-    def model(self, seen: Seen, view: View, layer: int) -> FogModel:
-        """Return the paths of a layer of an image, 0: airlight, 1: surfaces."""
-        ends = None
-        if self.near > 0 or np.isfinite(self.far):
-            ends = view.ends((self.near, self.far), self.spherical)
-        if self.planar:
-            ends = np.zeros_like(view.distance), view.distance * (view.reference.direction @ view.axis)
+    def model(self, seen: Seen, view: View, layer: int, ends: Ends | None) -> FogModel:
+        """Return the paths of a layer of an image, 0: airlight, 1: surfaces, with nodes between ends of a fog."""
         return seen.model(
             view,
             self.lights(seen.reference),
-            ends=ends,
+            ends=None if ends is None else view.ends(ends),
             shadows=self.shadows,
             radius=self.radius,
             blend=self.blend,
@@ -133,19 +124,20 @@ class SceneLight:
             key, lambda: seen.view(most=seen.rays, apart=APART, **scenery.where), lambda v: 40 * v.distance.size
         )
 
-    def model(self, seen: Seen, scenery: Scenery, layer: int) -> FogModel:
-        """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces."""
-        key = "model", scenery, layer, _sight(seen)
+    def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
+        """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces; `ends`: of a fog."""
+        key = "model", scenery, layer, ends, _sight(seen)
         view = self.view(seen, scenery)
-        return self._once(key, lambda: scenery.model(seen, view, layer), lambda model: 20 * model.places)
+        return self._once(key, lambda: scenery.model(seen, view, layer, ends), lambda model: 20 * model.places)
 
     def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
         """Return what a fog makes of a layer of the pixels, (m, 3) [W/(m^2 sr)]."""
         plain = fog.without_factors
-        if layer == 1:  # of which the ends of nodes change nothing
-            scenery = replace(scenery, near=0.0, far=np.inf, spherical=False, planar=False)
+        ends = fog.ends if layer == 0 else None
         key = "radiance", scenery, plain, layer, _sight(seen)
-        by_light = self._once(key, lambda: self.model(seen, scenery, layer).by_light(plain), lambda each: each.size)
+        by_light = self._once(
+            key, lambda: self.model(seen, scenery, layer, ends).by_light(plain), lambda each: each.size
+        )
         return fog.combined(by_light)[layer]
 
     def _once(self, key: Any, made: Callable[[], Any], size: Callable[[Any], int]) -> Any:

@@ -28,7 +28,7 @@ from reference.quadrature.height_fog import fog_of
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceScene
 from validation.fog_model.places import AROUND, Places
-from validation.fog_model.view import LightPaths, View
+from validation.fog_model.view import Ends, LightPaths, View
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
@@ -57,7 +57,7 @@ class Fog:
     far: float = np.inf  #: it ends at this plane, or at this distance [m]
     spherical: bool = False  #: whether `near` and `far` are distances from the camera, not planes
     #: Where depth along the axis is taken for distance along the ray: 'nodes' and 'surfaces' in what attenuates them,
-    #: 'steps' in the length of ray that a node stands for.
+    #: 'steps' in the length of ray that a node stands for, 'ends' where rays end.
     planar: frozenset[str] = frozenset()
     distance_power: float = 2.0  #: the irradiance falls as the distance to this power [1]
     window: Callable[[Array], Array] | None = None  #: factor on the light by the distance from it [m]
@@ -69,6 +69,14 @@ class Fog:
         old = getattr(self, name)
         entry: dict[str, Any] = {name: (*old[:number], value, *old[number + 1 :])}
         return replace(self, **entry)
+
+    @property
+    def ends(self) -> Ends | None:
+        """Between what along the rays it is; None where all of them are in it."""
+        if "ends" in self.planar:
+            return 0.0, np.inf, "depth"
+        some = self.near > 0 or np.isfinite(self.far)
+        return (self.near, self.far, "spheres" if self.spherical else "planes") if some else None
 
     @property
     def without_factors(self) -> "Fog":

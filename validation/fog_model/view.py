@@ -34,6 +34,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Light = ReferenceLight | DirectionalLight
+#: Distances between which a fog is [m], and of what: 'planes' before the camera or 'spheres' around it; 'depth': the
+#: depth of the surface taken for the distance along the ray.
+Ends = tuple[float, float, str]
 
 SAMPLES = 16  #: of an area light
 _FEW = 1000  # rays
@@ -53,11 +56,15 @@ class View:
     length: Array  #: of the rays up to the surfaces in each medium, (rays, media) [m]
     _found: dict[Any, Any] = field(default_factory=dict, repr=False)
 
-    def ends(self, planes: tuple[float, float], spherical: bool = False) -> tuple[Array, Array]:
-        """Return the distances of two planes before the camera, or of two spheres around it, along the rays [m]."""
-        slant = 1.0 if spherical else 1 / (self.reference.direction @ self.axis)
-        near, far = (np.broadcast_to(plane * slant, self.distance.shape) for plane in planes)
-        return near, far
+    def ends(self, ends: Ends) -> tuple[Array, Array]:
+        """Return the distances along the rays between which a fog is (rays,) each [m]."""
+        near, far, word = ends
+        cosine = self.reference.direction @ self.axis
+        if word == "depth":
+            return np.zeros_like(self.distance), self.distance * cosine
+        slant = 1.0 if word == "spheres" else 1 / cosine
+        near_ends, far_ends = (np.broadcast_to(plane * slant, self.distance.shape) for plane in (near, far))
+        return near_ends, far_ends
 
     def reach(self, light: Light, *, shadows: bool, area: ReferenceAreaLight | None) -> Any:
         """Return which parts of the rays a light reaches; the shape of an area light does not shadow its samples."""
