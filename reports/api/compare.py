@@ -25,7 +25,8 @@ from reports.api.inputs import (
 
 if TYPE_CHECKING:
     from reference.storage.exr import Image
-    from reports.api.comparisons import Diagnosed, Fitted, FramesComparison, ImageComparison, SceneComparison
+    from reports.api.comparisons import Fitted, ImageComparison, SceneComparison
+    from reports.tables.record import Said
 
 _ENDINGS = (".exr", ".png")
 
@@ -45,7 +46,7 @@ def compare(
     frames: str | os.PathLike[str] | None = None,
     output: Files = (),
     progress: Progress = None,
-) -> "ImageComparison | SceneComparison | Diagnosed | Fitted | FramesComparison":
+) -> "ImageComparison | SceneComparison | Fitted | Said":
     """Compare an image with another, or with the reference of a scene.
 
     The result has the bias and quantiles of the error, and statistics if there are standard errors. With a scene it
@@ -162,11 +163,11 @@ def _are_several(test: Any) -> bool:
     return isinstance(test, str | os.PathLike) and "#" in str(test) and not Path(test).exists()
 
 
-def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "FramesComparison":
+def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "Said":
     """Compare frames that `frames` tells of, or independent renders."""
     if not isinstance(test, str | os.PathLike):
         raise InputError("frames: wanted the files of all frames, such as 'frames/####.exr'; save the images first")
-    from reports.api.comparisons import FramesComparison
+    from reports.api.comparisons import frames_comparison
     from reports.machine.environment import activate
     from validation.motion.judge import compare_frames
     from validation.motion.noise import compare_runs
@@ -175,7 +176,7 @@ def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -
     with telling(progress, "the files") as tell:
         how["progress"] = tell
         compared = compare_runs(scene, test, **how) if frames is None else compare_frames(scene, test, frames, **how)
-    return FramesComparison(compared)
+    return frames_comparison(compared)
 
 
 def _is_scene(word: Any) -> bool:
@@ -267,7 +268,7 @@ def _two_images(
 def _with_scene(
     scene: str, path: Path, *, mask: Any, files: list[Path], progress: Any, **options: Any
 ) -> "SceneComparison":
-    from reports.api.comparisons import SceneComparison, write_difference
+    from reports.api.comparisons import scene_comparison, write_difference
     from validation.engine.judge import compare_scene
 
     if mask is not None and not isinstance(mask, str | os.PathLike):
@@ -276,15 +277,15 @@ def _with_scene(
         compared = compare_scene(scene, path, mask=mask, progress=tell, **options)
     images = compared.reference, compared.image
     said = tuple((str(file), write_difference(file, *images, kept=_mask(mask))) for file in files)
-    return SceneComparison(compared, said)
+    return scene_comparison(compared, said)
 
 
-def _diagnose(scene: str, path: Path, *, progress: Any, **how: Any) -> "Diagnosed":
-    from reports.api.comparisons import Diagnosed
+def _diagnose(scene: str, path: Path, *, progress: Any, **how: Any) -> "Said":
+    from reports.api.comparisons import diagnosed
     from validation.engine.diagnose import diagnose_file
 
     with telling(progress, "diagnosis") as tell:
-        return Diagnosed(diagnose_file(path, scene, progress=tell, **how))
+        return diagnosed(diagnose_file(path, scene, progress=tell, **how))
 
 
 def _fit(
@@ -299,7 +300,7 @@ def _fit(
     from reports.machine.environment import activate
 
     activate()
-    from reports.api.comparisons import Fitted
+    from reports.api.comparisons import fitted
     from validation.engine.judged_layer import judged_layer
     from validation.engine.seen import scene_of_size
     from validation.fit.fit import fit_image
@@ -307,7 +308,7 @@ def _fit(
     size = judged_layer(layers, name, name=layer, holds=how["holds"]).size
     loaded = scene_of_size(str(scene), size, name)
     with telling(progress, "fit") as tell:
-        fitted = fit_image(
+        found = fit_image(
             layers, loaded, names, path=name, layer=layer, mask=_mask(mask), starts=starts, progress=tell, **how
         )
-    return Fitted(fitted)
+    return fitted(found)

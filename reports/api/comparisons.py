@@ -3,7 +3,7 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,9 +23,9 @@ from reports.plotting.pictures import (
     tone_mapped,
     write_png,
 )
-from reports.tables.record import Result
-from reports.tables.table import Column, Interval, Table, table
-from validation.comparison.images import Comparison
+from reports.tables.record import Said
+from reports.tables.table import Column, Interval, table
+from validation.comparison.images import Comparison, shown
 from validation.engine.diagnose import Diagnosis
 from validation.engine.judge import EngineComparison
 from validation.fit.fit import Fit
@@ -103,64 +103,54 @@ class ImageComparison(Comparison, Pictured):
         m = self.metrics
         verdict = "passed" if self.passed else f"failed: {'; '.join(self.failures)}"
         return (
-            f"ImageComparison({self.title}: relative RMSE {m.relative_rmse:.3g}, "
-            f"relative bias {m.relative_bias:.3g}, {verdict})"
+            f"ImageComparison({self.title}: relative RMSE {shown(m.relative_rmse, 3)}, "
+            f"relative bias {shown(m.relative_bias, 3)}, {verdict})"
         )
 
 
-@dataclass(frozen=True, repr=False)
-class SceneComparison(Result):
-    """How far an image is from the reference of a scene."""
-
-    compared: EngineComparison
-    files: tuple[tuple[str, str], ...] = ()  #: differences that were written, and what they show
-
-    @property
-    def title(self) -> str:
-        """What is compared with what."""
-        return f"{self.compared.layer} of {self.compared.path} against {self.compared.scene}"
-
-    @property
-    def passed(self) -> bool:
-        """Whether the image has no fault."""
-        return not self.compared.failures
+class SceneComparison(Said):
+    """How far an image is from the reference of a scene; `of` has every number."""
 
     @property
     def metrics(self) -> Metrics:
         """The errors."""
-        return self.compared.comparison.metrics
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE --json` prints."""
-        return self.compared.to_json() | _differences(self.files)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The numbers, a line for each group."""
-        return [*self.compared.summary().split("\n"), *_difference_lines(self.files)]
+        compared: EngineComparison = self.of
+        return compared.comparison.metrics
 
 
-@dataclass(frozen=True, repr=False)
-class Diagnosed(Result):
-    """What is wrong with an image of a scene: with each of airlight and surfaces where it has both as layers."""
+def scene_comparison(compared: EngineComparison, files: Sequence[tuple[str, str]] = ()) -> SceneComparison:
+    """Return a comparison as a result; `files` are differences that were written, and what they show."""
+    return SceneComparison(
+        name=f"{compared.layer} of {compared.path} against {compared.scene}",
+        data=compared.to_json() | _differences(files),
+        lines=[*compared.summary().split("\n"), *_difference_lines(files)],
+        good=not compared.failures,
+        of=compared,
+    )
 
-    diagnoses: tuple[Diagnosis, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE --diagnose --json` prints: with several layers, a list of all too."""
-        several = [diagnosis.to_json()["diagnosis"] for diagnosis in self.diagnoses]
-        return {"diagnosis": several[0]} | ({"layers": several} if len(several) > 1 else {})
+def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
+    """Return what is wrong with an image: with each of airlight and surfaces where it has both as layers."""
+    several = [diagnosis.to_json()["diagnosis"] for diagnosis in diagnoses]
+    first, *others = (diagnosis.lines for diagnosis in diagnoses)
+    return Said(
+        name="diagnosis",
+        data={"diagnosis": several[0]} | ({"layers": several} if len(several) > 1 else {}),
+        lines=first + [line for lines in others for line in ("", *lines)],
+        good=not any(diagnosis.failures for diagnosis in diagnoses),
+        of=diagnoses,
+    )
 
-    @property
-    def passed(self) -> bool:
-        """Whether all pixels of the image are finite."""
-        return not any(diagnosis.failures for diagnosis in self.diagnoses)
 
-    @property
-    def lines(self) -> Sequence[str]:
-        """The faults, ranked by evidence."""
-        first, *others = (diagnosis.lines for diagnosis in self.diagnoses)
-        return first + [line for lines in others for line in ("", *lines)]
+def frames_comparison(compared: MotionComparison | NoiseComparison) -> Said:
+    """Return how far frames are from the reference of each, or independent renders from theirs."""
+    return Said(
+        name=f"{compared.pattern} against {compared.scene}: {compared.words}",
+        data=compared.to_json(),
+        lines=compared.lines(),
+        good=not compared.failures,
+        of=compared,
+    )
 
 
 _FITTED = (
@@ -171,77 +161,39 @@ _FITTED = (
 )
 
 
-@dataclass(frozen=True, repr=False)
-class Fitted(Result):
-    """The parameters of the fog that explain an image."""
-
-    fit: Fit
+class Fitted(Said):
+    """The parameters of the fog that explain an image; `of` has every number."""
 
     def __getitem__(self, name: str) -> Mapping[str, Any]:
         """Return 'value', 'low', 'high' and 'scene' of a parameter; lists where its channels differ."""
-        parameters: dict[str, Any] = self.to_dict()["parameters"]
+        parameters: dict[str, Any] = self.data["parameters"]
         return parameters[name]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE --fit NAMES --json` prints."""
-        numbers: dict[str, Any] = json.loads(json.dumps(self.fit.to_json()))
-        return numbers
 
-    @property
-    def title(self) -> str:
-        """What was fitted."""
-        values = ", ".join(f"{each.name}={each.value:.6g}" for each in self.fit.parameters)
-        return f"{self.fit.path} as {self.fit.scene}: {values}; relative RMSE left {self.fit.residual:.3g}"
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """The parameters with their intervals; channels have a row each."""
-        rows: list[dict[str, Any]] = []
-        for name, each in self.to_dict()["parameters"].items():
-            word, colon, place = name.partition(":")
-            several = {"": each}
-            if isinstance(each["value"], list):
-                several = {f".{c}": {key: value[i] for key, value in each.items()} for i, c in enumerate("rgb")}
-            for channel, of_it in several.items():
-                ends = Interval.of((of_it["low"], of_it["high"]))
-                rows.append({**of_it, "name": f"{word}{channel}{colon}{place}", "interval": ends})
-        return [table("Parameters that explain the image", _FITTED, rows)]
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """What the image cannot tell apart, and what is left over."""
-        return self.fit.lines
-
-    @property
-    def passed(self) -> bool:
-        """Whether all pixels of the image are finite."""
-        return not self.fit.failures
+def fitted(fit: Fit) -> Fitted:
+    """Return a fit as a result."""
+    values = ", ".join(f"{each.name}={each.value:.6g}" for each in fit.parameters)
+    data = json.loads(json.dumps(fit.to_json()))
+    return Fitted(
+        name=f"{fit.path} as {fit.scene}: {values}; relative RMSE left {fit.residual:.3g}",
+        data=data,
+        tables=(table("Parameters that explain the image", _FITTED, _fitted_rows(data["parameters"])),),
+        lines=fit.lines,
+        good=not fit.failures,
+        of=fit,
+    )
 
 
-@dataclass(frozen=True, repr=False)
-class FramesComparison(Result):
-    """How far frames of a scene that changes are from the reference of each, or independent renders from theirs."""
-
-    compared: MotionComparison | NoiseComparison
-
-    @property
-    def title(self) -> str:
-        """What was compared."""
-        return f"{self.compared.pattern} against {self.compared.scene}: {self.compared.words}"
-
-    @property
-    def passed(self) -> bool:
-        """Whether all values are finite, and the bias within the margin."""
-        return not self.compared.failures
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The numbers, a line for each group."""
-        return self.compared.lines()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight compare SCENE FILES [--frames FILE] --json` prints."""
-        return self.compared.to_json()
+def _fitted_rows(parameters: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield a row for each parameter; channels have a row each."""
+    for name, each in parameters.items():
+        word, colon, place = name.partition(":")
+        several = {"": each}
+        if isinstance(each["value"], list):
+            several = {f".{c}": {key: value[i] for key, value in each.items()} for i, c in enumerate("rgb")}
+        for channel, of_it in several.items():
+            ends = Interval.of((of_it["low"], of_it["high"]))
+            yield {**of_it, "name": f"{word}{channel}{colon}{place}", "interval": ends}
 
 
 def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:

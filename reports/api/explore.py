@@ -2,10 +2,10 @@
 """`airlight.describe` and `airlight.view`: a scene in numbers, a scene live."""
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analytic.errors import InputError
 from reports.api.inputs import (
@@ -23,57 +23,12 @@ from reports.api.inputs import (
     pixels_of,
     several,
 )
-from reports.tables.record import Result
-from reports.tables.table import Table
-
-if TYPE_CHECKING:
-    from reports.interchange.folder import FolderLog
-
-
-@dataclass(frozen=True, repr=False)
-class Description(Result):
-    """All that another renderer needs to render a scene."""
-
-    described: Mapping[str, Any]
-    written: Mapping[str, Any] | None = None  #: the glTF file
-    grid: str = ""  #: the medium that reads the volume file, as XML
-
-    @property
-    def title(self) -> str:
-        """The scene."""
-        return str(self.described["scene"])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight describe --json` prints."""
-        grid = {"grid": self.grid} if self.grid else {}
-        return {**self.described, **({} if self.written is None else {"gltf": self.written}), **grid}
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """A row for each number to set."""
-        from reports.interchange.words import description_table
-
-        return [description_table(self.described)]
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """How to judge the image."""
-        import shlex
-
-        command = shlex.join(["airlight", "compare", self.described["source"], self.described["file"]["name"]])
-        lines = [f"to judge it: {command}"]
-        if self.written is not None:
-            cut = ", ".join(self.written["tessellated"])
-            more = f"; cut into triangles: {cut}" if cut else ""
-            lines.append(f"{self.written['path']}: {self.written['triangles']} triangles{more}")
-        return [*lines, f"the fog as a grid: {self.grid}"] if self.grid else lines
+from reports.tables.record import Said
 
 
 @one_error
-def describe(
-    scene: SceneLike, *, size: Size | None = None, output: Files = (), progress: Progress = None
-) -> "Description | FolderLog":
-    """Describe all that another renderer needs to render a scene.
+def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), progress: Progress = None) -> Said:
+    """Describe everything that another renderer needs to render a scene.
 
     The description has the camera, media, lights and surfaces, what the pixels contain and which file to write.
     `airlight compare SCENE IMAGE.exr` then judges the image. The glTF file has the same camera, lights and meshes, with
@@ -123,7 +78,23 @@ def describe(
     written = [write_gltf(path, loaded) for path in files if path not in volumes]
     grids = [_write_grid(path, loaded.scene) for path in volumes]
     note(progress, described["notes"])
-    return Description(described, written[-1] if written else None, grids[-1] if grids else "")
+    return _said(described, written[-1] if written else None, grids[-1] if grids else "")
+
+
+def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid: str) -> Said:
+    """Return a description, with the glTF file and the medium that reads the volume file, as XML."""
+    from reports.interchange.words import description_table
+
+    command = shlex.join(["airlight", "compare", described["source"], described["file"]["name"]])
+    lines = [f"to judge it: {command}"]
+    if written is not None:
+        cut = ", ".join(written["tessellated"])
+        more = f"; cut into triangles: {cut}" if cut else ""
+        lines.append(f"{written['path']}: {written['triangles']} triangles{more}")
+    lines += [f"the fog as a grid: {grid}"] if grid else []
+    files = ({} if written is None else {"gltf": written}) | ({"grid": grid} if grid else {})
+    tables = (description_table(described),)
+    return Said(name=described["scene"], data={**described, **files}, tables=tables, lines=lines)
 
 
 def _write_grid(path: Path, scene: Any) -> str:

@@ -81,6 +81,19 @@ def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return wrapped
 
 
+def with_kernels(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Let a function begin where Mitsuba has its variant, and raise our own exceptions."""
+
+    @functools.wraps(function)
+    def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
+        from reports.machine.environment import activate
+
+        activate()
+        return function(*arguments, **named)
+
+    return one_error(wrapped)
+
+
 @functools.cache
 def scene_names() -> tuple[str, ...]:
     """Return the names of the built-in scenes, without Mitsuba, which their registry imports."""

@@ -28,18 +28,20 @@ from reports.api.inputs import (
     pixels_of,
     several,
     telling,
+    with_kernels,
 )
 
 if TYPE_CHECKING:
-    from reports.api.results import Animation, Plan, Rendering
+    from reports.api.results import Rendering
     from reports.api.scenes import OpenScene
+    from reports.tables.record import Said
     from validation.study.configuration import Configuration
 
 _ENDINGS = (".exr", ".png")
 _STAGES = ("surface", "shade", "render")  # the recorded functions of a frame
 
 
-@one_error
+@with_kernels
 def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     """Load a scene.
 
@@ -65,9 +67,6 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     >>> scene.plan()["lights"]
     '1 point'
     """
-    from reports.machine.environment import activate
-
-    activate()
     from reports.api.scenes import opened
 
     return opened(scene, size)
@@ -92,7 +91,7 @@ def render(
     timed: bool = False,
     progress: Progress = None,
     **parameters: Any,
-) -> "Rendering | Animation | Plan":
+) -> "Rendering | Said":
     """Render a frame or an animation; say what a frame costs.
 
     An animation is one turn: lights circle, objects turn, the medium's density swings, colours rotate. Each frame
@@ -116,14 +115,15 @@ def render(
     samples
         Camera rays per pixel. More than one gives a picture without aliasing; errors are measured at pixel centres.
     frames
-        Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json says what changes in them, for
-        `compare --frames`, where lights, colours or a homogeneous medium do.
+        Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json lists the changes of lights,
+        colours or a homogeneous medium, for `compare --frames`.
     animate
         What moves: light, objects, medium, colour, or several with commas; the scene's animation by default.
     run
-        Number of the run: a noisy method draws other random numbers in each, the same in each repetition.
+        Number of the run. A noisy method draws different random numbers in each run, and the same ones when a run is
+        repeated.
     frame
-        Number of the frame in its run, of an animation that of the first.
+        Number of the frame in its run; of an animation, number of its first frame.
     output
         A file to write: .exr for all layers, .png for a tone-mapped picture; may be given several times.
     plan
@@ -307,13 +307,14 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     )
 
 
-def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None, progress: Progress) -> "Animation":
+def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None, progress: Progress) -> "Said":
     """Render the frames of an animation and write each as soon as it is done."""
     import time
 
     import numpy as np
 
-    from reports.api.results import Animation, write_image
+    from reports.api.results import animation as written_frames
+    from reports.api.results import write_image
     from reports.machine.environment import activate
     from reports.plotting.pictures import tone_curve
     from validation.scenes.animation import animate, frame_changes, frame_objects, moved_parts, parse_moves
@@ -350,7 +351,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
         for written in _write_frames(path, loaded.name, changes_by_frame, shapes)
     ]
     moving, rendering = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
-    return Animation(
+    return written_frames(
         scene=loaded.name,
         method=chosen.label,
         size=(read.camera.width, read.camera.height),
@@ -386,7 +387,7 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
     return path.with_name(f"{path.stem}-{number:0{digits}d}{path.suffix}")
 
 
-def _plan(asked: _Asked) -> "Plan":
+def _plan(asked: _Asked) -> "Said":
     """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import ShadowPlanes
@@ -394,10 +395,10 @@ def _plan(asked: _Asked) -> "Plan":
     from realtime.parameters import values
     from realtime.scene.light_samples import with_light_samples
     from realtime.scene.read_scene import describe
-    from reports.api.results import Plan
+    from reports.tables.record import Said
     from validation.study.configuration import prepared
 
-    _, read = asked.read()
+    loaded, read = asked.read()
     words, notes = describe(read.features), tuple(read.features.notes)
     method, seen = find_method(asked.chosen.method), read
     if read.area_lights:
@@ -410,7 +411,8 @@ def _plan(asked: _Asked) -> "Plan":
     if issubclass(method, ShadowPlanes):
         words |= describe_occluders(occluder_plan(seen))
         _warnings(prepared(read, asked.chosen))
-    return Plan(words, notes)
+    lines = [*(f"{name}: {said}" for name, said in words.items()), *notes]
+    return Said(name=loaded.name, data={"plan": words, "notes": list(notes)}, lines=lines)
 
 
 def _warnings(renderer: Any) -> tuple[str, ...]:

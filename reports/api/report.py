@@ -5,7 +5,7 @@ import math
 import os
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -26,14 +26,12 @@ from reports.api.inputs import (
     several,
     telling,
 )
-from reports.tables.drawing import html, sentence_in_text
-from reports.tables.record import Result, block, bullets
+from reports.tables.drawing import html
+from reports.tables.record import Result, Said, block, bullets
 from reports.tables.table import Table
 
 if TYPE_CHECKING:
     from reports.data import records
-    from reports.diff.compare import Difference
-    from validation.papers.claims import Judged
 
 FOLDER = "airlight-report"  #: where a report is written by default
 
@@ -93,11 +91,6 @@ class Report(Result):
         count = len(self.data.scenes)
         page = f"{self.page}: {count} scene{'' if count == 1 else 's'}, {self.done}"
         return [page, *self.figures]
-
-    def text(self, *, width: int | None = None, styled: bool = False) -> str:
-        """Return the claims, the table and where it was written."""
-        claims = "".join(f"- {sentence_in_text(claim)}\n" for claim in self.claims)
-        return claims + super().text(width=width, styled=styled).replace("\n\n", "\n")
 
     @property
     def title(self) -> str:
@@ -301,50 +294,20 @@ def _done(report: "records.Report") -> str:
     return f"{report.computed} results in {report.seconds:.0f} s{more}"
 
 
-@dataclass(frozen=True, repr=False)
-class ReportDifference(Result):
-    """What differs between two reports."""
-
-    difference: "Difference"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight diff --json` prints."""
-        return self.difference.to_json()
-
-    @property
-    def passed(self) -> bool:
-        """Whether nothing is worse."""
-        return not self.difference.worse
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """The findings, the worse ones first."""
-        from reports.diff.compare import difference_tables
-
-        return difference_tables(self.difference)
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """Findings without numbers, and what could be seen."""
-        from reports.diff.compare import difference_lines
-
-        return difference_lines(self.difference)
-
-
 def diff(
     old: File,
     new: File,
     *,
     time_tolerance: float = 0.25,
-) -> ReportDifference:
+) -> Said:
     """Compare two reports: what got slower or less accurate.
 
     The result also has what got better, what is new and what is gone.
 
-    Errors have little noise: they may change by 2 %, a maximum by 4 %, or by float32 rounding. Times have much: the
-    quartiles of both reports say how busy the machine was, and a change must appear in all stages that share it. Times
-    of two machines are compared relative to the median of all. The exit status is 1 if anything is worse, gone, newly
-    refused or no longer finite, or if the reference is no longer confirmed.
+    Errors have little noise: they may change by 2 %, a maximum by 4 %, or by float32 rounding. Times have more noise:
+    the quartiles of both reports say how busy the machine was, and a change must appear in all stages that share it.
+    Times of two machines are compared relative to the median of all. The exit status is 1 if anything is worse, gone,
+    newly refused or no longer finite, or if the reference is no longer confirmed.
 
     Parameters
     ----------
@@ -356,54 +319,19 @@ def diff(
         Relative change of a time that counts as noise on a quiet machine; inf compares no times.
     """
     from reports.data.reader import read_report
-    from reports.diff.compare import compare_reports
+    from reports.diff.compare import compare_reports, difference_lines, difference_tables
 
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
-    return ReportDifference(compare_reports(*reports, time_tolerance=tolerance))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PaperClaims(Result):
-    """The claims of papers with their verdicts."""
-
-    rows: "tuple[Judged, ...]"  #: as they stand under `papers` of report.json
-    left_out: int  #: claims that need images
-    numbers: bool = False  #: whether numbers without a verdict are shown
-    environment: Mapping[str, Any] | None = None
-    figures: tuple[str, ...] = ()  #: files that were written
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight paper --json` prints."""
-        from reference.storage.kept import date
-
-        rows = [asdict(row) for row in self.rows]
-        return {"measured": date(), "environment": self.environment, "papers": rows, "left_out": self.left_out}
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """A table of verdicts for each paper, and of numbers."""
-        from reports.tables.papers import number_tables, verdict_tables
-
-        return [*verdict_tables(self.rows), *(number_tables(self.rows) if self.numbers else [])]
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """How many claims have each verdict."""
-        lines = [f"{self.title}."]
-        if self.left_out:
-            lines.append(f"{self.left_out} more rows need images: leave out --quick.")
-        return [*lines, *self.figures]
-
-    @property
-    def title(self) -> str:
-        """How many claims have each verdict."""
-        from reports.tables.papers import count_words
-
-        return count_words([row for row in self.rows if row.verdict is not None])
+    found = compare_reports(*reports, time_tolerance=tolerance)
+    return Said(
+        name=f"{new} against {old}",
+        data=found.to_json(),
+        tables=difference_tables(found),
+        lines=difference_lines(found),
+        good=not found.worse,
+        of=found,
+    )
 
 
 @one_error
@@ -413,7 +341,7 @@ def paper(
     figures: File | None = None,
     quick: bool = False,
     progress: Progress = None,
-) -> PaperClaims:
+) -> Said:
     """Give a verdict on every claim of the papers.
 
     Equations, figures, tables and sentences stand next to what was measured. A verdict is reproduced, not reproduced,
@@ -423,8 +351,8 @@ def paper(
     Parameters
     ----------
     name
-        biri, billeter, ali or bouthors, with its numbers that have no verdict too, such as rates of graphics cards; the
-        verdicts of all by default.
+        biri, billeter, ali or bouthors: also the numbers of the paper that have no verdict, such as frame rates of
+        graphics cards. By default the verdicts of all papers.
     figures
         Also draw the pictures of the papers in our scenes into this folder, as PDF and PNG with their data.
     quick
@@ -437,8 +365,11 @@ def paper(
     InputError
         For an unknown paper.
     """
+    from reference.storage.kept import date
     from reports.machine.environment import activate, describe_environment
     from reports.report.others import measure_claims
+    from reports.tables.papers import count_words, number_tables, verdict_tables
+    from validation.columns import plain
     from validation.papers.claims import claims, papers
 
     if name is not None and name not in papers():
@@ -453,4 +384,9 @@ def paper(
 
         with telling(progress, "figures") as tell:
             written = write_figures(Path(figures), name, quick=quick, progress=tell)
-    return PaperClaims(tuple(rows), len(chosen) - len(rows), name is not None, describe_environment(), written)
+    left_out = len(chosen) - len(rows)
+    counted = count_words([row for row in rows if row.verdict is not None])
+    lines = [f"{counted}.", *([f"{left_out} more rows need images: leave out --quick."] if left_out else []), *written]
+    data = {"measured": date(), "environment": describe_environment(), "papers": plain(rows), "left_out": left_out}
+    tables = [*verdict_tables(rows), *(number_tables(rows) if name is not None else [])]
+    return Said(name=counted, data=data, tables=tables, lines=lines, of=tuple(rows))

@@ -30,7 +30,7 @@ from reports.plotting.pictures import (
     write_png,
 )
 from reports.tables.methods import rate_words
-from reports.tables.record import Result
+from reports.tables.record import Result, Said
 from validation.columns import plain
 from validation.timing import FrameTimes
 
@@ -288,63 +288,26 @@ class Reference(LayeredImage):
         return f"{self.scene}, the reference by {self.estimator}"
 
 
-@dataclass(frozen=True, repr=False, kw_only=True)
-class Animation(Result):
-    """The frames of an animation, which were written as files, and what they cost."""
+def animation(*, moves: Sequence[str], size: tuple[int, int], files: Sequence[str], **known: Any) -> Said:
+    """Return the frames of an animation, which were written as files, and what they cost.
 
-    scene: str
-    method: str
-    size: tuple[int, int]  #: [pixels]
-    frames: int
-    moves: tuple[str, ...]  #: what moves
-    move_ms: float  #: median of the frames after the first
-    render_ms: float  #: the same
-    recordings: Mapping[str, int]  #: how often each stage was compiled
-    device: str
-    files: tuple[str, ...]
-
-    @property
-    def title(self) -> str:
-        """What was rendered."""
-        return f"{self.scene}, {self.method}: {self.frames} frames, {' and '.join(self.moves)} moving"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight render --frames --json` prints."""
-        listed = {"size": list(self.size), "moves": list(self.moves), "files": list(self.files)}
-        return dict(vars(self)) | listed | {"frame_ms": self.move_ms + self.render_ms}
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """What it costs, and which files were written."""
-        frame = self.move_ms + self.render_ms
-        lines = [self.title]
-        lines.append(
-            f"  {frame:.3g} ms a frame ({rate_words(frame)}): {self.move_ms:.3g} ms to move, {self.render_ms:.3g} ms "
-            f"to render, reusing what stood still; {self.device}"
-        )
-        for ending in dict.fromkeys(Path(path).suffix for path in self.files):
-            files = [path for path in self.files if path.endswith(ending)]
-            size = " x ".join(map(str, self.size))
-            pixels = f"{files[0]} to {files[-1]}: {len(files)} files, {size} pixels"
-            lines.append(f"wrote {f'{files[0]}: what changes' if ending == '.json' else pixels}")
-        return lines
-
-
-@dataclass(frozen=True, repr=False)
-class Plan(Result):
-    """What a scene needs of a method."""
-
-    features: Mapping[str, str]  #: by name, in words
-    notes: tuple[str, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight render --plan --json` prints."""
-        return {"plan": dict(self.features), "notes": list(self.notes)}
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The features and the notes."""
-        return [*(f"{name}: {words}" for name, words in self.features.items()), *self.notes]
+    `known` has the `scene`, the `method`, the number of `frames`, the medians `move_ms` and `render_ms` of the frames
+    after the first, `recordings`, how often each stage was compiled, and the `device`.
+    """
+    move, rendering = known["move_ms"], known["render_ms"]
+    frame = move + rendering
+    title = f"{known['scene']}, {known['method']}: {known['frames']} frames, {' and '.join(moves)} moving"
+    lines = [
+        title,
+        f"  {frame:.3g} ms a frame ({rate_words(frame)}): {move:.3g} ms to move, {rendering:.3g} ms to render, reusing "
+        f"what stood still; {known['device']}",
+    ]
+    for ending in dict.fromkeys(Path(path).suffix for path in files):
+        own = [path for path in files if path.endswith(ending)]
+        pixels = f"{own[0]} to {own[-1]}: {len(own)} files, {' x '.join(map(str, size))} pixels"
+        lines.append(f"wrote {f'{own[0]}: what changes' if ending == '.json' else pixels}")
+    listed = {"size": list(size), "moves": list(moves), "files": list(files), "frame_ms": frame}
+    return Said(name=title, data=known | listed, lines=lines)
 
 
 def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, total: Array | None = None) -> None:

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reports.api.inputs import File, Progress, one_error, only_from, telling
-from reports.tables.drawing import sentence_in_text
-from reports.tables.record import Result
-from reports.tables.table import Table
+from reports.tables.record import Result, Said
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Place
@@ -76,42 +74,6 @@ class SweepRun(Result):
         return lines
 
 
-@dataclass(frozen=True, repr=False)
-class SweepFindings(Result):
-    """What the rows of a sweep say."""
-
-    said: Any  #: `reports.sweep.summary.Summary`
-    page: Path
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight sweep --from DIR --json` prints."""
-        from reports.sweep.summary import to_json
-
-        return to_json(self.said)
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """Errors and speed of configurations."""
-        from reports.sweep.tables import errors_table, speed_table
-
-        return [errors_table(self.said), speed_table(self.said)]
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The page, and of how many cells it is."""
-        return [
-            f"{self.page}: {self.said.scenes} scenes, {len(self.said.samples)} configurations, {len(self.said.sweep)} "
-            "cells"
-        ]
-
-    def text(self, *, width: int | None = None, styled: bool = False) -> str:
-        """Return the claims, the table and the page."""
-        from reports.sweep.summary import headlines
-
-        claims = "".join(f"- {each.kind}: {sentence_in_text(each.text)}\n" for each in headlines(self.said))
-        return claims + super().text(width=width, styled=styled)
-
-
 @one_error
 def sweep(
     study: File | int | None = None,
@@ -120,7 +82,7 @@ def sweep(
     output: File | None = None,
     from_: File | None = None,
     progress: Progress = None,
-) -> SweepRun | SweepFindings:
+) -> SweepRun | Said:
     """Run every method over many scenes: a row of numbers each.
 
     A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
@@ -129,8 +91,8 @@ def sweep(
     Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing
     but cells that failed, hung or aborted.
 
-    `--from DIR` writes what the rows say: DIR/sweep.html, figures, and claims with their confidence as JSON; with -o
-    into another folder.
+    `--from DIR` writes the findings: DIR/sweep.html, figures, and claims with their confidence as JSON; -o names
+    another folder.
 
     The exit status is 1 if a cell failed, hung or aborted, or was left undone.
 
@@ -155,9 +117,7 @@ def sweep(
     if from_ is not None:
         beside = {"a study": study, "cluster": cluster}
         only_from("sweep", "computes nothing", beside)
-        from reports.sweep.page import write_sweep
-
-        return SweepFindings(*write_sweep(Path(from_), None if output is None else Path(output)))
+        return _findings(Path(from_), None if output is None else Path(output))
     from reports.cluster.connect import parse_place
     from validation.study.rows import RowStore
     from validation.study.study import default_study, read_study
@@ -170,6 +130,24 @@ def sweep(
     with RowStore(folder) as store:
         ran = _run(chosen, store, place, variant=variant, progress=progress)
         return replace(ran, parquet=str(store.write_parquet()) if len(store) else None)
+
+
+def _findings(source: Path, target: Path | None) -> Said:
+    """Write what the rows of a sweep say, and return it."""
+    from reports.sweep.page import write_sweep
+    from reports.sweep.summary import headlines, to_json
+    from reports.sweep.tables import errors_table, speed_table
+
+    said, page = write_sweep(source, target)
+    count = f"{said.scenes} scenes, {len(said.samples)} configurations, {len(said.sweep)} cells"
+    return Said(
+        name=str(page),
+        data=to_json(said),
+        claims=[f"{each.kind}: {each.text}" for each in headlines(said)],
+        tables=(errors_table(said), speed_table(said)),
+        lines=(f"{page}: {count}",),
+        of=said,
+    )
 
 
 def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any) -> SweepRun:

@@ -38,7 +38,7 @@ class Listing(Result):
 def list_(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None) -> Listing:
     """List the built-in scenes, methods, kernels, studies and papers.
 
-    Methods and kernels stand with the defaults of their parameters, which `--set` changes.
+    The lists of methods and kernels name their parameters with the defaults, which `--set` changes.
 
     Parameters
     ----------

@@ -15,13 +15,12 @@ from validation.kernels.records import Stability
 from validation.metrics.errors import Metrics, RunsError
 from validation.metrics.flip import Flip
 from validation.papers.claims import Judged
-from validation.statistics.records import Agreement, MultipleScattering
+from validation.statistics.records import Agreement, MultipleScattering, Number
 from validation.study.row import Cost
 from validation.timing import FrameTimes, Scaling
 
 SCHEMA = "airlight-report/2"
 
-Number = float | None
 Size = tuple[int, int]  #: width and height [pixels]
 Files = Mapping[str, str]  #: names relative to the folder of the report, by what they are
 

@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What becomes of each scene file of a folder: taken, or refused with which words."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from reports.interchange.scene import describe_scene
 from reports.machine.mitsuba_log import collected_notes
-from reports.tables.record import Result
-from reports.tables.table import Table, table, words
+from reports.tables.record import Said
+from reports.tables.table import table, words
+from validation.columns import plain
 from validation.scenes.loading import load_scene
 
 
@@ -24,32 +23,17 @@ class FileOutcome:
     words: str  #: notes of a file that was taken, else what stands in the way
 
 
-@dataclass(frozen=True, repr=False)
-class FolderLog(Result):
-    """What becomes of each scene file of a folder."""
-
-    folder: str
-    files: list[FileOutcome]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight describe FOLDER --json` prints."""
-        return asdict(self)
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """A row for each file."""
-        counts = {word: sum(each.outcome == word for each in self.files) for word in ("taken", "refused", "failed")}
-        summed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
-        columns = (*words("file", "outcome"), *words(words="notes, or what stands in the way", how={"long": True}))
-        return [table(f"{len(self.files)} scene files: {summed}", columns, map(vars, self.files))]
-
-
-def describe_folder(folder: Path) -> FolderLog:
+def describe_folder(folder: Path) -> Said:
     """Return what `describe` makes of each XML file in a folder and its folders."""
     files = sorted(folder.rglob("*.xml"))
     if not files:
         raise InputError(f"scene: the folder {folder} holds no .xml file; wanted Mitsuba scene files")
-    return FolderLog(str(folder), [_outcome(path, folder) for path in files])
+    log = [_outcome(path, folder) for path in files]
+    counts = {word: sum(each.outcome == word for each in log) for word in ("taken", "refused", "failed")}
+    summed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    columns = (*words("file", "outcome"), *words(words="notes, or what stands in the way", how={"long": True}))
+    shown = table(f"{len(log)} scene files: {summed}", columns, map(vars, log))
+    return Said(name=str(folder), data={"folder": str(folder), "files": plain(log)}, tables=(shown,), of=log)
 
 
 def _outcome(path: Path, folder: Path) -> FileOutcome:

@@ -90,10 +90,10 @@ class Doctor(Result):
 def doctor(*, clear_cache: bool = False) -> Doctor:
     """Show what works on this machine, and how to fix what does not.
 
-    That is Python and its packages, LLVM, CUDA, OptiX, OpenGL for shaders, a test kernel in a process of its own, and
-    the cache: finished references and results lie in `~/.cache/airlight` (or in `$XDG_CACHE_HOME/airlight`).
-    `AIRLIGHT_CACHE_DIR` names another folder, `AIRLIGHT_CACHE_SIZE` another limit than 4 GiB (500MB, 20GiB; 0 keeps
-    nothing): above it the files that were used longest ago are removed.
+    The command examines Python and its packages, LLVM, CUDA, OptiX, OpenGL for shaders, a test kernel in a separate
+    process, and the cache: finished references and results lie in `~/.cache/airlight` (or in
+    `$XDG_CACHE_HOME/airlight`). `AIRLIGHT_CACHE_DIR` names another folder, `AIRLIGHT_CACHE_SIZE` another limit than
+    4 GiB (500MB, 20GiB; 0 keeps nothing): above it the files that were used longest ago are removed.
 
     Exit status 3 if no kernel can be run, 1 if a file of the cache could not be removed.
 

@@ -65,7 +65,8 @@ def slab(
 ) -> SlabStudy:
     """Compute the light of a slab in sunlight by order of scattering.
 
-    That is what it reflects and transmits, and where that light leaves it. Order n is light that was scattered n times.
+    The study computes how much light the slab reflects and transmits, and where the light leaves the slab. Light of
+    order n was scattered n times.
     Displacements are measured from the point of entry, horizontally: the mean along the direction in which the sun's
     light travels, and rms, the root of the mean of x^2 + y^2. The numbers come from a deterministic computation with an
     estimate of its error; `--photons` puts a random walk with standard errors beside them. See docs/the-reference.md.
@@ -124,8 +125,8 @@ def slab(
     return SlabStudy(
         name="slab",
         data=record,
-        drawn=tuple(_slab_tables(record)),
-        said=(said,),
+        tables=tuple(_slab_tables(record)),
+        lines=(said,),
         rows=tuple(record["orders"]),
         draw=partial(_draw_slab, record),
     )

@@ -17,10 +17,10 @@ from reports.api.inputs import (
     Values,
     Words,
     listed,
-    one_error,
     pixels_of,
     several,
     telling,
+    with_kernels,
 )
 from reports.machine.progress import counted, part_of
 from reports.studies.methods import cells_of, check_study, loaded_scenes, scene_by_scene
@@ -29,7 +29,7 @@ from reports.tables.table import numbers, table
 from validation.timing import Scaling, StepCost
 
 
-@one_error
+@with_kernels
 def scaling(
     scenes: Scenes = (),
     *,
@@ -56,9 +56,6 @@ def scaling(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate
-
-    activate()
     from reports.api.render import asked_configurations
     from reports.tables.scaling import cliffs, scaling_tables
     from validation.study.growth import study_growth
@@ -84,8 +81,8 @@ def scaling(
     return Study(
         name="scaling",
         data=with_environment(scaling=records),
-        drawn=tuple(scaling_tables(records)),
-        wrong=tuple(cliffs(records)),
+        tables=tuple(scaling_tables(records)),
+        faults=tuple(cliffs(records)),
         draw=partial(_draw_scaling, records),
     )
 
@@ -125,7 +122,7 @@ _FEW = "has too few values above 0"
 _SHARES = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=FRACTION)
 
 
-@one_error
+@with_kernels
 def map_size(
     scenes: Scenes = (),
     *,
@@ -155,9 +152,6 @@ def map_size(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate
-
-    activate()
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import check_size
     from reports.api.render import checked_configuration
@@ -207,8 +201,8 @@ def map_size(
     return Study(
         name="map-size",
         data=with_environment(size=list(loaded[0].size), maps=texels, scenes=data),
-        drawn=tuple(tables),
-        said=tuple(said),
+        tables=tuple(tables),
+        lines=tuple(said),
         rows=tuple(rows),
         draw=partial(_draw_maps, label, texels, drawn),
     )
@@ -226,7 +220,7 @@ def _draw_maps(label: str, texels: list[int], drawn: list[tuple[str, list[float]
     panel = figure.subplots()
     sizes = np.array(texels)
     for (name, errors, order, standard_error), style in zip(drawn, scene_styles()):
-        values = np.array(errors)
+        values = np.array(errors, dtype=float)
         panel.plot(sizes, values, linestyle="none", label=f"{name}: order {order:.2f} ± {standard_error:.2f}", **style)
         if np.isfinite(order):
             level = np.exp(np.mean(np.log(values[values > 0]) + order * np.log(sizes[values > 0])))

@@ -9,11 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from analytic.errors import InputError
-from reports.api.inputs import File, KernelLike, Kernels, Progress, kernel_name, one_error, several, telling
+from reports.api.inputs import (
+    File,
+    KernelLike,
+    Kernels,
+    Progress,
+    kernel_name,
+    one_error,
+    several,
+    telling,
+    with_kernels,
+)
 from reports.machine.progress import counted
 from reports.studies.result import Study, with_environment
 from reports.tables.kernels import kernel_tables, stability_summary
-from reports.tables.table import Column, Table, table
+from reports.tables.table import Column, table
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,7 +42,7 @@ _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "
 _SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge
 
 
-@one_error
+@with_kernels
 def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progress = None) -> Study:
     """Time airlight kernels alone and measure their errors.
 
@@ -49,9 +59,6 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
         Called with (fraction done, what); True shows a bar.
     """
     from analytic.phase import phase_from_words
-    from reports.machine.environment import activate
-
-    activate()
     from validation.kernels.benchmark import PHASES, bench_kernels, speed_against_error
 
     phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
@@ -62,8 +69,8 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     return Study(
         name="kernels",
         data=with_environment(kernels={"costs": found, "levels": levels}),
-        drawn=tuple(kernel_tables(found, levels)),
-        said=("ns/ray: the kernel alone by Dr.Jit's history, median.",),
+        tables=tuple(kernel_tables(found, levels)),
+        lines=("ns/ray: the kernel alone by Dr.Jit's history, median.",),
         draw=partial(_draw_costs, [cost for cost in found if cost.phase == phases[0][0] and cost.time]),
     )
 
@@ -101,7 +108,7 @@ def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
 _TRIED_RAYS = 100_000
 
 
-@one_error
+@with_kernels
 def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     """Look for rays on which kernels break.
 
@@ -116,9 +123,6 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate
-
-    activate()
     from validation.kernels.stability import BAR, CERTIFIED
     from validation.kernels.stability import stability as run
 
@@ -128,8 +132,8 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     return Study(
         name="stability",
         data=with_environment(certified=CERTIFIED, bar=BAR, kernels=found),
-        drawn=(stability_summary(found),),
-        said=tuple(line for one in found for line in _stability_lines(one)),
+        tables=(stability_summary(found),),
+        lines=tuple(line for one in found for line in _stability_lines(one)),
         good=not any(one.broken for one in found),
     )
 
@@ -199,14 +203,6 @@ class Integrals(Study):
         return Path(path)
 
     @property
-    def tables(self) -> Sequence[Table]:
-        """The first integrals."""
-        data = {"": list(range(len(self)))} | self.columns()
-        left = len(self) - _ROWS
-        shown = [Column(name, name, digits=9) for name in data]
-        return [table("", shown, list(zip(*data.values()))[:_ROWS], explanation=f"and {left} more" if left > 0 else "")]
-
-    @property
     def title(self) -> str:
         """How many, by what, and how wrong."""
         found, said = self.summary, ""
@@ -214,11 +210,6 @@ class Integrals(Study):
             errors = ", ".join(f"{name} {found[name]:.3g}" for name in ("p50", "p99", "max"))
             said = f"; relative error of {found['compared']}: {errors}; worst in row {found['worst_row']}"
         return f"{len(self)} integrals by {self.kernel} in {self.precision} precision{said}"
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """The title."""
-        return (self.title,)
 
 
 @one_error
@@ -270,7 +261,7 @@ def integrals(
         check_results(read, J, named)
     if certify and read.value is None:
         read = replace(read, value=certified(read)[0])
-    return Integrals(
+    found = Integrals(
         name="integrals",
         data=summary(read, J),
         J=_sealed(J, shape),
@@ -279,6 +270,11 @@ def integrals(
         precision=precision,
         cases=read,
     )
+    data = {"": list(range(len(found)))} | found.columns()
+    more = f"and {len(found) - _ROWS} more" if len(found) > _ROWS else ""
+    shown = [Column(name, name, digits=9) for name in data]
+    first = table("", shown, list(zip(*data.values()))[:_ROWS], explanation=more)
+    return replace(found, tables=(first,), lines=(found.title,))
 
 
 def _cases(cases: Any) -> "tuple[Cases, tuple[int, ...]]":

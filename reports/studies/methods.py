@@ -15,9 +15,9 @@ from reports.api.inputs import (
     Size,
     Values,
     note,
-    one_error,
     several,
     telling,
+    with_kernels,
 )
 from reports.machine.progress import part_of
 from reports.studies.result import FRACTION, Study, with_environment
@@ -115,7 +115,7 @@ def _reaches(row: Mapping[str, Any], error: float) -> bool:
     return known and row["relative_rmse"] <= error and not row["nonfinite"]
 
 
-@one_error
+@with_kernels
 def methods(
     scenes: Scenes = (),
     *,
@@ -158,9 +158,6 @@ def methods(
     >>> found.fastest(1e-3)["relative_rmse"] < 1e-3
     True
     """
-    from reports.machine.environment import activate
-
-    activate()
     from reports.api.render import asked_configurations
     from reports.report.claims import own_faults
     from reports.report.scene import row_record
@@ -186,9 +183,9 @@ def methods(
     return MethodsStudy(
         name="methods",
         data=with_environment(scenes=benched),
-        drawn=tuple(tables),
+        tables=tuple(tables),
         rows=tuple(rows),
-        wrong=tuple(dict.fromkeys(wrong)),
+        faults=tuple(dict.fromkeys(wrong)),
     )
 
 
@@ -212,7 +209,7 @@ def _flat(row: Any, chosen: Any) -> dict[str, Any]:
 _PARTS = {"relative_rmse": FRACTION, "relative_bias": FRACTION, "fraction": {"percent": True, "places": 1}}
 
 
-@one_error
+@with_kernels
 def decomposition(
     scenes: Scenes = (),
     *,
@@ -239,9 +236,6 @@ def decomposition(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate
-
-    activate()
     from reports.api.render import asked_configurations
     from validation.study.study import standard_study
 
@@ -269,7 +263,7 @@ def decomposition(
     return Study(
         name="decomposition",
         data=with_environment(scenes=data),
-        drawn=tuple(tables),
+        tables=tuple(tables),
         rows=tuple(rows),
         draw=partial(_draw_parts, drawn[0]) if drawn and drawn[0] else None,
     )

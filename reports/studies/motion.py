@@ -4,7 +4,7 @@
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, one_error, pixels_of, telling
+from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, pixels_of, telling, with_kernels
 from reports.machine.progress import counted
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import numbers, table, words
@@ -16,7 +16,7 @@ _TURN = 120  # frames of a whole turn in a sweep
 _RUNS = 4  # of a method that draws random numbers
 
 
-@one_error
+@with_kernels
 def motion(
     scene: SceneLike = "sphere-spot",
     *,
@@ -48,9 +48,6 @@ def motion(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate
-
-    activate()
     from reports.api.render import asked_configurations
     from reports.api.scenes import opened
     from validation.study.configuration import named_configurations
@@ -79,7 +76,7 @@ def motion(
     title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
     data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=rows)
     return Study(
-        name="motion", data=data, drawn=(table(title, columns, rows),), rows=tuple(rows), draw=partial(_draw, found)
+        name="motion", data=data, tables=(table(title, columns, rows),), rows=tuple(rows), draw=partial(_draw, found)
     )
 
 

@@ -5,7 +5,7 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, one_error, pixels_of, telling
+from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, pixels_of, telling, with_kernels
 from reports.machine.progress import counted
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import Interval, numbers, table, words
@@ -17,7 +17,7 @@ _GOAL = 0.01  # error, until which the time is given
 _MOST = 1e5  # runs that are averaged in the figure
 
 
-@one_error
+@with_kernels
 def noise(
     scene: SceneLike = "sphere-spot",
     *,
@@ -47,9 +47,6 @@ def noise(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate
-
-    activate()
     from reports.api.render import asked_configurations
     from reports.api.scenes import opened
     from validation.columns import plain
@@ -89,8 +86,8 @@ def noise(
     return Study(
         name="noise",
         data=data,
-        drawn=(table(title, columns, shown),),
-        said=tuple(f"{each.label}: {each.noise.words}" for each in found),
+        tables=(table(title, columns, shown),),
+        lines=tuple(f"{each.label}: {each.noise.words}" for each in found),
         rows=tuple(rows),
         draw=partial(_draw, found),
     )

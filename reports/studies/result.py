@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
-from reports.tables.record import Result
-from reports.tables.table import Table
+from reports.tables.record import Said
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,15 +18,9 @@ ENDINGS = (".csv", ".tex", ".md", ".json", ".pdf", ".png")  #: of the files that
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Study(Result):
-    """The outcome of a study."""
+class Study(Said):
+    """The outcome of a study; its data are what `airlight study NAME --json` prints."""
 
-    name: str
-    data: Any  #: as `airlight study NAME --json` prints it
-    drawn: tuple[Table, ...] = ()
-    said: tuple[str, ...] = ()  #: sentences
-    wrong: tuple[str, ...] = ()  #: faults, for the error stream
-    good: bool = True  #: whether all that was checked is as it should be
     rows: tuple[Mapping[str, Any], ...] = ()  #: a row for each measurement, plain numbers by name
     draw: "Callable[[str], Figure] | None" = None  #: returns the figure for a column, 'single' or 'double'
 
@@ -44,30 +37,6 @@ class Study(Result):
     def title(self) -> str:
         """Its name."""
         return f"{self.name}, {len(self.rows)} rows" if self.rows else self.name
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """Its tables."""
-        return self.drawn
-
-    @property
-    def lines(self) -> Sequence[str]:
-        """Its sentences."""
-        return self.said
-
-    @property
-    def faults(self) -> Sequence[str]:
-        """What is wrong."""
-        return self.wrong
-
-    @property
-    def passed(self) -> bool:
-        """Whether all that was checked is as it should be."""
-        return self.good and not self.wrong
-
-    def to_dict(self) -> Any:
-        """Return the data."""
-        return self.data
 
     def columns(self) -> dict[str, list[Any]]:
         """Return the rows as columns by name, as `pandas.DataFrame` takes them."""
@@ -100,11 +69,11 @@ class Study(Result):
 
             return save_figure(target, self.draw, column)
         if target.suffix == ".csv":
-            write_text(target, _rows_csv(self.rows) if self.rows else "\n".join(map(csv, self.drawn)))
+            write_text(target, _rows_csv(self.rows) if self.rows else "\n".join(map(csv, self.tables)))
         elif target.suffix == ".tex":
-            write_text(target, "\n".join(latex([table]) for table in self.drawn))
+            write_text(target, "\n".join(latex([table]) for table in self.tables))
         elif target.suffix == ".md":
-            write_text(target, "\n".join(map(markdown, self.drawn)))
+            write_text(target, "\n".join(map(markdown, self.tables)))
         elif target.suffix == ".json":
             write_text(target, json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
         else:

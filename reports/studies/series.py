@@ -4,7 +4,7 @@
 from functools import partial
 from typing import Any
 
-from reports.api.inputs import one_error
+from reports.api.inputs import with_kernels
 from reports.studies.result import Study
 from reports.tables.table import table_of
 
@@ -14,7 +14,7 @@ _BIRI = ("isotropic", "rayleigh", "hazy", "murky")
 _CURVES = ("exact", "taylor", "taylor-printed")
 
 
-@one_error
+@with_kernels
 def polynomials() -> Study:
     """Compare Biri's polynomials with the airlight kernel over the angle.
 
@@ -25,9 +25,6 @@ def polynomials() -> Study:
     exact, by the derived Taylor polynomial of degree 4 and by the one printed in the annex; and the fractions of rays
     that the three kernels integrate to within 1 % and 10 %.
     """
-    from reports.machine.environment import activate
-
-    activate()
     import numpy as np
 
     from validation.columns import plain
@@ -44,7 +41,9 @@ def polynomials() -> Study:
     percent = {key: {"percent": True} for key in ("within_1_percent", "within_10_percent")}
     drawn = table_of("Fractions of rays that a kernel integrates within an error", WithinError, within, how=percent)
     data = {"rays": _RAYS, "within": plain(within), "curves": rows}
-    return Study(name="polynomials", data=data, drawn=(drawn,), rows=tuple(rows), draw=partial(_draw_polynomials, rows))
+    return Study(
+        name="polynomials", data=data, tables=(drawn,), rows=tuple(rows), draw=partial(_draw_polynomials, rows)
+    )
 
 
 def _curves(phase: str, a: float, theta: Any) -> dict[str, Any]:

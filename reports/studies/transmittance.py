@@ -4,7 +4,7 @@
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from reports.api.inputs import Progress, SceneLike, one_error, telling
+from reports.api.inputs import Progress, SceneLike, telling, with_kernels
 from reports.studies.result import FRACTION, Study, with_environment
 from reports.tables.table import table_of
 
@@ -20,7 +20,7 @@ _STYLES = {
 }
 
 
-@one_error
+@with_kernels
 def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> Study:
     """Measure estimators of the transmittance of rays through a density grid.
 
@@ -35,9 +35,6 @@ def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> S
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate
-
-    activate()
     from reference.scene.read import read_reference
     from reports.api.scenes import opened
     from validation.columns import shown_values
@@ -53,7 +50,7 @@ def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> S
     return Study(
         name="transmittance",
         data=data,
-        drawn=(drawn,),
+        tables=(drawn,),
         rows=tuple(map(shown_values, rows)),
         draw=partial(_draw, rows),
     )

@@ -7,10 +7,11 @@ status 1 where it did not pass.
 
 import base64
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
-from reports.tables.drawing import html, sentence_in_html, text
+from reports.tables.drawing import html, sentence_in_html, sentence_in_text, text
 from reports.tables.table import Column, Table
 from reports.tables.table import table as make_table
 
@@ -25,6 +26,11 @@ class Result:
     def title(self) -> str:
         """What it is about."""
         return ""
+
+    @property
+    def claims(self) -> Sequence[str]:
+        """Sentences that stand above the tables."""
+        return ()
 
     @property
     def tables(self) -> Sequence[Table]:
@@ -56,16 +62,45 @@ class Result:
         raise NotImplementedError
 
     def text(self, *, width: int | None = None, styled: bool = False) -> str:
-        """Return its tables and sentences for a terminal."""
+        """Return what it says for a terminal."""
+        claims = "".join(f"- {sentence_in_text(claim)}\n" for claim in self.claims)
         drawn = [text(table, width=width, styled=styled) for table in self.tables]
         lines = [*([""] if drawn and self.lines else []), *self.lines]
-        return "".join(drawn) + "".join(f"{line}\n" for line in lines)
+        return claims + "".join(drawn) + "".join(f"{line}\n" for line in lines)
 
     def _repr_html_(self) -> str:
-        return block(self.title, *map(html, self.tables), bullets(self.lines))
+        return block(self.title, bullets(self.claims), *map(html, self.tables), bullets(self.lines))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.title})"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Said(Result):
+    """A result that is worked out as a whole."""
+
+    name: str  #: what it is about
+    data: Any = None  #: as JSON has them
+    claims: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    lines: Sequence[str] = ()
+    faults: Sequence[str] = ()  #: for the error stream
+    good: bool = True  #: whether all that was checked is as it should be
+    of: Any = None  #: the record that says so
+
+    @property
+    def title(self) -> str:
+        """What it is about."""
+        return self.name
+
+    @property
+    def passed(self) -> bool:
+        """Whether all that was checked is as it should be, and there are no faults."""
+        return self.good and not self.faults
+
+    def to_dict(self) -> Any:
+        """Return the data."""
+        return self.data
 
 
 # Pieces of HTML for notebooks, without scripts.

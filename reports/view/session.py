@@ -340,7 +340,7 @@ class Session:
         known = self.reference.known
         if self._judged is not None and known is not None and (self.reference.done or self.reference.failure):
             error, self._judged = view_error(known, self._judged), None
-            if self.reference.done and error is not None:
+            if self.reference.done and error is not None and error.relative_rmse is not None:
                 self._in_motion.append(error)
                 rmse, interval = motion_error(self._in_motion)
                 told = {"rmse": rmse, "interval": interval, "frames": len(self._in_motion), "pixels": error.known}

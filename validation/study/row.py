@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from validation.columns import Column, column, columns_of, plain, values_of
+from validation.columns import Column, column, columns_of, plain, shown_values
 from validation.metrics.colour import ColourDifference
 from validation.metrics.errors import RADIANCE, Metrics, RunsError
 from validation.metrics.flip import Flip
@@ -164,10 +164,7 @@ COLUMNS: tuple[Column, ...] = columns_of(Row)
 
 def row_values(row: Row) -> dict[str, Any]:
     """Return the values of a row by the names of its columns; what is not finite is None."""
-    values = values_of(row)
-    own = {each.key: values.get(each.key) for each in COLUMNS}
-    own |= {name: value for name, value in values.items() if name.startswith(PROPERTY)}
-    return {name: plain(value) for name, value in own.items()}
+    return shown_values(row) | {f"{PROPERTY}{name}": plain(value) for name, value in row.properties.items()}
 
 
 def property_names(rows: Iterable[Mapping[str, Any]]) -> list[str]:

@@ -21,7 +21,7 @@ def test_each_file_has_its_outcome(variant, tmp_path):
     (tmp_path / "projector.xml").write_text(SCENE.format(COEFFICIENTS, LAMP.replace("point", "projector", 1)))
     (tmp_path / "torn.xml").write_text("<scene")
     log = describe_folder(tmp_path)
-    found = {each.file: each for each in log.files}
+    found = {each.file: each for each in log.of}
     outcomes = {name: each.outcome for name, each in found.items()}
     assert outcomes == {
         "good.xml": "taken",
