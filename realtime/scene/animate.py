@@ -23,7 +23,7 @@ from realtime.scene.lights import DirectionalExtent, Light
 from realtime.scene.media.medium import Medium
 from realtime.scene.mesh_adjacency import Occluders
 from realtime.scene.read_scene import Scene
-from realtime.scene.triangle_table import Facets, read_facets, with_rotations
+from realtime.scene.triangle_table import Facets, read_facets, turned_facets
 
 Array = NDArray[np.float64]
 
@@ -168,7 +168,7 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
     replace_positions(objects.parameters, positions)
     facets = objects.facets
     if facets is not None:
-        facets = with_rotations(facets, dict.fromkeys(objects.numbers.values(), turn))
+        facets = turned_facets(facets, objects.numbers.values(), turn)
     return replace(scene, positions={**scene.positions, **positions}, facets=facets)
 
 

@@ -6,7 +6,7 @@ are uniformly diffuse meshes, the number of the triangle says all, and reading i
 A scene with anything else is shaded by Mitsuba's interaction.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Any
@@ -30,7 +30,6 @@ class Facets:
     normals: Any  #: four numbers each, or each of its corners: the unit normal, and 1 if it is lit from both sides
     albedos: Any  #: four numbers each: the diffuse reflectance, and the number of its shape in the scene
     smooth: bool  #: whether normals are those of corners, to be interpolated
-    rotations: Any  #: by shape, what turns its normals: three rows of four numbers, the last 0
 
 
 def read_facets(scene, types: ArrayTypes) -> Facets | None:
@@ -51,22 +50,17 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
         aligned_array(types.scalar, normals.ravel()),
         aligned_array(types.scalar, albedos.ravel()),
         smooth,
-        aligned_array(types.scalar, _no_rotations(len(shapes)).ravel()),
     )
     dr.make_opaque(table)
     return table
 
 
-def with_rotations(facets: Facets, rotations: Mapping[int, NDArray[np.float64]]) -> Facets:
-    """Return the triangles with the shapes of these numbers turned by matrices (3, 3), the others as they were read."""
-    table = _no_rotations(dr.width(facets.rotations) // 12)
-    for number, rotation in rotations.items():
-        table[number, :, :3] = rotation
-    return replace(facets, rotations=aligned_array(type(facets.rotations), table.ravel()))
-
-
-def _no_rotations(shapes: int) -> NDArray[np.float64]:
-    return np.tile(np.eye(3, 4), (shapes, 1, 1))
+def turned_facets(facets: Facets, numbers: Collection[int], turn: NDArray[np.float64]) -> Facets:
+    """Return the triangles with the normals of the shapes of some numbers turned by a matrix (3, 3)."""
+    rows, shape = (np.array(table).reshape(-1, 4) for table in (facets.normals, facets.albedos))
+    moved = np.repeat(np.isin(shape[:, 3], list(numbers)), 3 if facets.smooth else 1)
+    rows[moved, :3] = rows[moved, :3] @ turn.T
+    return replace(facets, normals=aligned_array(type(facets.normals), rows.ravel()))
 
 
 def facet_number(facets: Facets, hit, active):
@@ -81,25 +75,16 @@ def facet_at(facets: Facets, number, uv, active):
     `uv`, barycentric coordinates, is only read where normals are interpolated.
     """
     Four = four_numbers(type(facets.normals))
-    red, green, blue, shape = dr.gather(Four, facets.albedos, number, active)
+    red, green, blue, _ = dr.gather(Four, facets.albedos, number, active)
     if not facets.smooth:
         x, y, z, two_sided = dr.gather(Four, facets.normals, number, active)
-        return _turned(facets, shape, (x, y, z), active), two_sided > 0, (red, green, blue)
+        return (x, y, z), two_sided > 0, (red, green, blue)
     Float = type(red)
     u, v = Float(uv.x), Float(uv.y)
     corners = [dr.gather(Four, facets.normals, 3 * number + k, active) for k in range(3)]
     x, y, z = (dr.fma(u, b, dr.fma(v, c, (1 - u - v) * a)) for a, b, c in list(zip(*corners))[:3])
     scale = dr.rsqrt(x * x + y * y + z * z)
-    normal = _turned(facets, shape, (x * scale, y * scale, z * scale), active)
-    return normal, corners[0].w > 0, (red, green, blue)
-
-
-def _turned(facets: Facets, shape, normal, active):
-    """Return normals of shapes, by their numbers, as they are where the shapes stand."""
-    Four = four_numbers(type(facets.normals))
-    x, y, z = normal
-    rows = [dr.gather(Four, facets.rotations, 3 * mi.UInt32(shape) + k, active) for k in range(3)]
-    return tuple(dr.fma(row.x, x, dr.fma(row.y, y, row.z * z)) for row in rows)
+    return (x * scale, y * scale, z * scale), corners[0].w > 0, (red, green, blue)
 
 
 def _is_plain(shape) -> bool:

@@ -8,12 +8,13 @@ of `realtime.scene.camera`, W x H pixels, it is the point
 
 z the distance along the axis. Slices are equal steps of s. Their distribution is exponential,
 
-    z(s) = near ((1 + far/near)^s - 1),        s(z) = log(1 + z/near) / log(1 + far/near),
+    z(s) = near ((1 + far/near)^s - 1),        s(z) = log(1 + z/near) / log(1 + far/near),        near = far/8,
 
 which begins at the camera: up to the depth `near` slices are about equally thick, beyond it in proportion to their
-depth. It is linear in the limit of a large `near`, z(s) = far s. What lies beyond `far` scatters nothing.
+depth. What lies beyond `far` scatters nothing.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,7 +27,7 @@ from realtime.scene.camera import Camera
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Medium, Rays
 
-_NEAR = 1 / 8  # of `far`, where it is not given
+_RATIO = 8  # far/near
 _OPTICAL_REACH = 3.0  # optical depth behind a light that is worth slices: e^-6 = 0.25 % of the light comes back from it
 _REACH = 32.0  # the same in distances of the light: the airlight beyond x falls like 1/x
 
@@ -40,7 +41,6 @@ class Grid:
     slices: int  #: froxels in depth
     camera: Camera
     far: Metres  #: depth where the last slice ends [m]
-    near: Metres | None  #: depth up to which slices are about equally thick [m]; None: all are
 
     @property
     def columns(self) -> int:
@@ -49,15 +49,11 @@ class Grid:
 
     def depth(self, s: PerRay) -> Metres:
         """Return z(s) [m]."""
-        if self.near is None:
-            return s * self.far
-        return self.near * (dr.exp(s * dr.log(1 + self.far / self.near)) - 1)
+        return self.far / _RATIO * (dr.exp(s * math.log(1 + _RATIO)) - 1)
 
     def share(self, depth: Metres) -> PerRay:
         """Return s(z); `depth` is z [m]."""
-        if self.near is None:
-            return depth / self.far
-        return dr.log(1 + depth / self.near) / dr.log(1 + self.far / self.near)
+        return dr.log(1 + depth / self.far * _RATIO) / math.log(1 + _RATIO)
 
     def column_ray(self, column: PerRay, shift: tuple[Any, Any] = (0, 0)) -> PerRay:
         """Return the vector from the camera to depth 1 in columns, `shift` parts of a froxel beside their middle."""
@@ -75,16 +71,9 @@ class Grid:
         return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
 
 
-def view_grid(view: View, *, size: tuple[int, int, int], near: float, far: float, distribution: str) -> Grid:
-    """Return the grid of a view.
-
-    `view`: the frame; `size`: froxels across, down and in depth; `near`, `far`: depths [m]; 0: chosen for the frame;
-    `distribution`: 'exponential' or 'linear'.
-    """
-    Float = type(view.distance)
-    end = dr.opaque(Float, far) if far else _frame_depth(view)
-    begin = dr.opaque(Float, near) if near else end * _NEAR
-    return Grid(*size, view.camera, end, begin if distribution == "exponential" else None)
+def view_grid(view: View, *, size: tuple[int, int, int], far: float) -> Grid:
+    """Return the grid of a view: froxels across, down and in depth, up to a depth [m]; 0: chosen for the frame."""
+    return Grid(*size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view))
 
 
 def column_rays(view: View, grid: Grid) -> Rays:

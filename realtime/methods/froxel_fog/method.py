@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
 from realtime.memory import check_memory
 from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pixels
 from realtime.methods.froxel_fog.grid import column_rays, view_grid
@@ -53,14 +52,6 @@ class FroxelFog(Method):
     width: int = parameter(160, "froxels across the image", least=1, most=4096)
     height: int = parameter(90, "froxels down the image", least=1, most=4096)
     slices: int = parameter(64, "froxels in depth", least=1, most=4096)
-    distribution: str = parameter(
-        "exponential",
-        "slices that grow with their depth, or equally thick ones",
-        choices=("exponential", "linear"),
-    )
-    near: float = parameter(
-        0.0, "depth up to which exponential slices are about equally thick; 0: far/8", least=0, unit="m"
-    )
     far: float = parameter(
         0.0, "depth where the grid ends; 0: that of the farthest surface, or where light fades", least=0, unit="m"
     )
@@ -72,12 +63,6 @@ class FroxelFog(Method):
         512,
         "texels on a side of a face of the map, with `shadow=map`; half as many for each point of an area light",
     )
-
-    def _check_together(self) -> None:
-        if self.far and self.near >= self.far:
-            raise InputError(f"near: got {self.near:g} with far={self.far:g}, wanted a depth before it")
-        if self.distribution == "linear" and self.near:
-            raise InputError(f"near: got {self.near:g} with distribution=linear, wanted 0: all slices are equal")
 
     @property
     def point_map(self) -> int:
@@ -133,8 +118,8 @@ class FroxelFog(Method):
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
-        grid = view_grid(view, size=self.grid_size, near=self.near, far=self.far, distribution=self.distribution)
-        dr.eval(grid.far, grid.near)
+        grid = view_grid(view, size=self.grid_size, far=self.far)
+        dr.eval(grid.far)
         shift = frame_shift(view) if self.noisy else (0, 0, 0)
         visible, rays = _visibility(view, state, self.shadow), column_rays(view, grid)
         scattered = scattered_light(view, grid, rays, shift=shift, tables=state.tables, visible=visible)

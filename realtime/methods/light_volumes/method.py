@@ -75,9 +75,6 @@ class LightVolumes(Method):
         above=0,
         wanted=f"a positive number, for instance {THRESHOLD:g}",
     )
-    surface: str = parameter(
-        "map", "where the shadows on surfaces come from; a mesh always casts rays", choices=("map", "ray")
-    )
     walls: str = parameter(
         "upright",
         "where the map jumps: at a place that rays find, or across one texel as published; a mesh has slanted ones",
@@ -105,7 +102,7 @@ class LightVolumes(Method):
     @property
     def provides_visibility(self):
         """Rays that walk over the map find out which surfaces are lit."""
-        return self.evaluation == "walk" and self.surface == "map"
+        return self.evaluation == "walk"
 
     def check(self, scene):
         """Refuse a mesh in bounded media, and more memory than the machine has."""
