@@ -85,7 +85,6 @@ class CloudCollectors(Method):
     renders_clouds = True
     layers = (*ORDER_LAYERS, OPACITY)
     prepared_from = frozenset({"geometry", "light"})
-    uses_kernel = False
     casts_rays = True
     provides_visibility = True
     by_rays = True

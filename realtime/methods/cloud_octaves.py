@@ -65,7 +65,6 @@ class CloudOctaves(Method):
     renders_clouds = True
     layers = (*ORDER_LAYERS, OPACITY)
     prepared_from = frozenset({"geometry", "light"})
-    uses_kernel = False
     casts_rays = True
     provides_visibility = True
 

@@ -48,11 +48,9 @@ class EquiAngular(Method):
     summary = "a few random samples a ray, each of one light chosen by its power: noisy, and right in the mean"
     source = "Kulla and Fajardo 2012"
     prepared_from = frozenset({"light", "look"})
-    uses_kernel = False
     casts_rays = True
     by_rays = True
     at_once = True
-    noisy = True
 
     samples: int = parameter(1, "samples of every ray", least=1)
     jitter: str = parameter(

@@ -90,19 +90,9 @@ class RayMarch(Method):
             raise InputError(f"animate: got {self.animate} without jitter, wanted jitter=white, blue or ign with it")
 
     @property
-    def noisy(self):
-        """Shifts of steps are random."""
-        return self.jitter != "none"
-
-    @property
     def uses_kernel(self):
         """Runs of lit steps are integrated by a kernel."""
         return self.sum == "transitions"
-
-    @property
-    def casts_rays(self):
-        """Shadow rays are cast from the steps."""
-        return self.shadow == "ray"
 
     def check(self, scene):
         """Refuse maps that have no room, and uniform steps on an unbounded ray through a vacuum."""

@@ -16,7 +16,6 @@ class Veil(Method):
     name = "veil"
     summary = "a veil"
     source = "tests"
-    uses_kernel = False
     provides_visibility = True
     carries = True
     at_once = True

@@ -46,7 +46,6 @@ class FroxelFog(Method):
     summary = "scattered light in a grid along the view, summed front to back: what engines ship"
     source = "Wronski 2014; Hillaire 2015"
     prepared_from = frozenset({"geometry", "light"})
-    uses_kernel = False
     at_once = True
 
     width: int = parameter(160, "froxels across the image", least=1, most=4096)
@@ -73,16 +72,6 @@ class FroxelFog(Method):
     def grid_size(self) -> tuple[int, int, int]:
         """Froxels across, down and in depth."""
         return self.width, self.height, self.slices
-
-    @property
-    def casts_rays(self):
-        """Shadow rays are cast from the froxels."""
-        return self.shadow == "ray"
-
-    @property
-    def noisy(self):
-        """Samples of a run begin at a random place in their froxels."""
-        return self.jitter != "none"
 
     def check(self, scene):
         """Refuse a grid and maps that need more memory than the machine has."""

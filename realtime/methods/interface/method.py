@@ -197,8 +197,6 @@ class Method(Parameters):
 
     # What a frame must know. Each may be a property that follows from the parameters.
     prepared_from: ClassVar[frozenset[str]] = frozenset(MOVABLE)  #: what `prepare` looks at; else its state is kept
-    uses_kernel: ClassVar[bool] = True  #: whether it calls an airlight kernel
-    casts_rays: ClassVar[bool] = False  #: whether it asks `View.visible` or the geometry
     provides_visibility: ClassVar[bool] = False  #: whether it says which surfaces its lights reach
     by_rays: ClassVar[bool] = False  #: whether each ray is computed by itself, so that any pixels can be rendered alone
     frozen: ClassVar[bool] = True  #: whether Dr.Jit can record it once and replay it
@@ -206,7 +204,6 @@ class Method(Parameters):
     by_source: ClassVar[bool] = False  #: whether its visibility has one entry for all samples of an area light
     carries: ClassVar[bool] = False  #: whether it hands arrays on to the next frame, as `Layers.carried`
     history: ClassVar[Any] = None  #: how frames are averaged (`realtime.methods.history.History`); None: not at all
-    noisy: ClassVar[bool] = False  #: whether its image depends on the number of the run, as `View.run`
 
     def check(self, scene: Scene) -> None:
         """Refuse a scene, by `InputError`, that the method with these parameters cannot render."""
@@ -251,6 +248,21 @@ class Method(Parameters):
                 visibility.append(reached)
             total += found
         return Layers(total, tuple(visibility) if self.provides_visibility else None)
+
+    @property
+    def uses_kernel(self) -> bool:
+        """Whether it calls an airlight kernel: by default, if it has an `airlight`."""
+        return type(self).airlight is not Method.airlight
+
+    @property
+    def casts_rays(self) -> bool:
+        """Whether it asks `View.visible` or the geometry: by default, with the parameter shadow=ray."""
+        return getattr(self, "shadow", "") == "ray"
+
+    @property
+    def noisy(self) -> bool:
+        """Whether its image depends on the number of the run, as `View.run`: by default, if it has a `jitter`."""
+        return getattr(self, "jitter", "none") != "none"
 
     @property
     def interpolated(self) -> float:

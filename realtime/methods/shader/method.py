@@ -31,7 +31,6 @@ class Shader(Method):
     map: int = map_size(512, "texels on a side of a face of a shadow map")
 
     summary = "a user's shader"
-    uses_kernel = False
     casts_rays = True
     frozen = False
     at_once = True

@@ -47,7 +47,6 @@ class SoftShaftsParameters(Method):
     summary = "few points of a light, visibility in few levels, smoothed by bilateral filters"
     source = "Ali 2016, reconstructed from captions"
     prepared_from = frozenset({"geometry", "light"})
-    uses_kernel = False
     casts_rays = True
     provides_visibility = True
     at_once = True
