@@ -313,8 +313,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
 
     import numpy as np
 
-    from reports.api.results import animation as written_frames
-    from reports.api.results import write_image
+    from reports.api.results import frames_written, write_image
     from reports.machine.environment import activate
     from reports.plotting.pictures import tone_curve
     from validation.scenes.animation import animate, frame_changes, frame_objects, moved_parts, parse_moves
@@ -351,7 +350,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
         for written in _write_frames(path, loaded.name, changes_by_frame, shapes)
     ]
     moving, rendering = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
-    return written_frames(
+    return frames_written(
         scene=loaded.name,
         method=chosen.label,
         size=(read.camera.width, read.camera.height),

@@ -288,7 +288,7 @@ class Reference(LayeredImage):
         return f"{self.scene}, the reference by {self.estimator}"
 
 
-def animation(*, moves: Sequence[str], size: tuple[int, int], files: Sequence[str], **known: Any) -> Said:
+def frames_written(*, moves: Sequence[str], size: tuple[int, int], files: Sequence[str], **known: Any) -> Said:
     """Return the frames of an animation, which were written as files, and what they cost.
 
     `known` has the `scene`, the `method`, the number of `frames`, the medians `move_ms` and `render_ms` of the frames

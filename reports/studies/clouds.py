@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Studies of clouds: a slab in sunlight by order of scattering, and the grid of canonical transport."""
 
-import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -11,10 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from analytic.errors import InputError
 from reports.api.inputs import Progress, Words, one_error, several, telling
 from reports.studies.result import Study
-from reports.tables.table import Column, Table, numbers, table, words
+from reports.tables.table import Column, Table, numbers, table, table_of, words
+from validation.columns import columns_of, plain
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from validation.slab.light import SlabNumbers
 
     Depths: TypeAlias = Sequence[float] | str | None
     Directions: TypeAlias = Sequence[tuple[float, float]] | str
@@ -22,14 +22,6 @@ else:
     Depths = Directions = str
 
 _SIDES = (("reflectance", "reflected", "blue"), ("transmittance", "transmitted", "vermillion"))
-_ORDERS = (
-    ("reflectance", "reflected"),
-    ("reflected_mean", "mean"),
-    ("reflected_rms", "rms"),
-    ("transmittance", "transmitted"),
-    ("transmitted_mean", "mean"),
-    ("transmitted_rms", "rms"),
-)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -115,57 +107,57 @@ def slab(
             f"photons: {photons} photons would take about {hours:.1f} hours; give fewer, or set AIRLIGHT_FORCE=1"
         )
     with telling(progress, "slab") as tell:
-        record = json.loads(json.dumps(slab_numbers(request, photons=int(photons), progress=tell)))
-    total = record["total"]
-    error = record["error"]["total"]
+        found = slab_numbers(request, photons=int(photons), progress=tell)
+    total, error = found.total, found.error.total
     said = (
-        f"All orders: reflectance {total['reflectance']:.7g} +- {error['reflectance']:.1g}, transmittance "
-        f"{total['transmittance']:.7g} +- {error['transmittance']:.1g} (with the light that was never scattered)."
+        f"All orders: reflectance {total.reflectance:.7g} +- {error.reflectance:.1g}, transmittance "
+        f"{total.transmittance:.7g} +- {error.transmittance:.1g} (with the light that was never scattered)."
     )
+    data = plain(found)
     return SlabStudy(
         name="slab",
-        data=record,
-        tables=tuple(_slab_tables(record)),
+        data=data,
+        tables=tuple(_slab_tables(found)),
         lines=(said,),
-        rows=tuple(record["orders"]),
-        draw=partial(_draw_slab, record),
+        rows=tuple(data["orders"]),
+        draw=partial(_draw_slab, found),
     )
 
 
-def _slab_tables(record: Mapping[str, Any]) -> Iterator[Table]:
-    def by_order(title: str, rows: Any, digits: int = 6) -> Table:
-        columns = (*words("orders"), *(Column(key, heading, digits=digits) for key, heading in _ORDERS))
-        return table(title, columns, rows)
+def _slab_tables(found: "SlabNumbers") -> Iterator[Table]:
+    from validation.slab.light import Flux, OrderLight, Radiance
 
     six = {"digits": 6}
-    yield by_order("By order; lengths in mean free paths", record["orders"])
-    photons = record.get("photons")
-    if photons:
-        yield by_order(f"By {photons['count']} photons", photons["orders"])
-        yield by_order("Standard errors of the photons", photons["standard_error"]["orders"], digits=2)
-    fluence = [{"orders": row["orders"], **each} for row in record["orders"] for each in row["fluence"]]
+
+    def shown(title: str, record: type, rows: Sequence[Any], digits: int = 6) -> Table:
+        return table_of(title, record, rows, how={each.key: {"digits": digits} for each in columns_of(record)})
+
+    yield shown("By order; lengths in mean free paths", OrderLight, found.orders)
+    if found.photons:
+        yield shown(f"By {found.photons.count} photons", OrderLight, found.photons.orders)
+        yield shown("Standard errors of the photons", OrderLight, found.photons.standard_error.orders, 2)
+    fluence = [{"orders": row.orders, **vars(each)} for row in found.orders for each in row.fluence]
     if fluence:
         columns = (*words("orders"), *numbers("depth", "value", "mean", "rms", how=six))
         yield table("Fluence for unit flux across the beam", columns, fluence)
-    total = record["total"]
-    if total["flux"]:
-        columns = numbers("depth", "up", "down", how=six)
-        yield table("Diffuse flux of all orders for a flux of pi across the beam", columns, total["flux"])
-    if total["radiance"]:
-        errors = record["error"]["total"]["radiance"]
-        rows = [{**row, "error": error["value"]} for row, error in zip(total["radiance"], errors, strict=True)]
-        columns = (*numbers("depth", "mu", "phi", "value", how=six), Column("error", "error", digits=2))
-        yield table("Radiance of all orders for a flux of pi across the beam", columns, rows)
+    total = found.total
+    if total.flux:
+        yield shown("Diffuse flux of all orders for a flux of pi across the beam", Flux, total.flux)
+    if total.radiance:
+        title = "Radiance of all orders for a flux of pi across the beam"
+        columns = (*shown(title, Radiance, ()).columns, Column("error", "error", digits=2))
+        errors = found.error.total.radiance
+        yield table(title, columns, [{**vars(row), "error": e.value} for row, e in zip(total.radiance, errors)])
 
 
-def _draw_slab(record: Mapping[str, Any], column: str) -> Any:
+def _draw_slab(found: "SlabNumbers", column: str) -> Any:
     """Return what leaves a slab by order, and how far from the entry, computed and by photons."""
     import numpy as np
 
     from reports.plotting.figure import new_figure
     from reports.plotting.style import COLOURS, WIDTHS, reference_style
 
-    rows, walked = record["orders"], record.get("photons")
+    rows, walked = found.orders, found.photons
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.5 * width)
     fractions, lengths = figure.subplots(*((1, 2) if double else (2, 1)))
@@ -173,12 +165,12 @@ def _draw_slab(record: Mapping[str, Any], column: str) -> Any:
     dots = reference_style() | {"linestyle": "none", "marker": "o", "markersize": 2.5}
 
     def values(of: Any, name: str) -> Any:
-        return np.array([np.nan if row[name] is None else row[name] for row in of], dtype=float)
+        return np.array([np.nan if getattr(row, name) is None else getattr(row, name) for row in of], dtype=float)
 
     def put(panel: Any, name: str, at: Any, label: str | None = None) -> None:
         if walked:
-            errors = 2 * np.nan_to_num(values(walked["standard_error"]["orders"], name))
-            panel.errorbar(at, values(walked["orders"], name), errors, capsize=2, label=label, **dots)
+            errors = 2 * np.nan_to_num(values(walked.standard_error.orders, name))
+            panel.errorbar(at, values(walked.orders, name), errors, capsize=2, label=label, **dots)
 
     for number, (name, side, colour) in enumerate(_SIDES):
         at = places + 0.4 * number - 0.2
@@ -189,7 +181,7 @@ def _draw_slab(record: Mapping[str, Any], column: str) -> Any:
             lengths.plot(places, values(rows, key), style, color=COLOURS[colour], label=f"{side}, {kind}")
             put(lengths, key, places)
     for panel in (fractions, lengths):
-        panel.set_xticks(places, [row["orders"] for row in rows], rotation=45)
+        panel.set_xticks(places, [row.orders for row in rows], rotation=45)
         panel.set_xlabel("order of scattering")
         panel.legend()
     fractions.set_ylabel("fraction of the light [1]")

@@ -14,6 +14,7 @@ light. The spread of one axis about the mean, the sigma of Bouthors 2008, is sqr
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from realtime.clouds.slab_orders.phases import SlabPhase
 from reference.monte_carlo.slab_walk.estimates import ExitEstimate, SlabEstimate, slab_estimate
 from reference.monte_carlo.slab_walk.walk import Slab
+from validation.columns import column, record_of
 from validation.slab.moments import SlabOrders, order_sets
 from validation.slab.radiance import slab_radiance
 from validation.slab.request import SlabRequest
@@ -39,15 +41,95 @@ _GIVEN = ("orders", "depth", "mu", "phi")
 _SCATTERING = 0.4e-6
 
 
+Number = float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fluence:
+    """The fluence at a depth."""
+
+    depth: float
+    value: Number
+    mean: Number
+    rms: Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderLight:
+    """The light of some orders of scattering."""
+
+    orders: str
+    reflectance: Number = column("reflected")
+    reflected_mean: Number = column("mean")
+    reflected_rms: Number = column("rms")
+    transmittance: Number = column("transmitted")
+    transmitted_mean: Number = column("mean")
+    transmitted_rms: Number = column("rms")
+    fluence: tuple[Fluence, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flux:
+    """The diffuse flux at a depth."""
+
+    depth: float
+    up: Number
+    down: Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Radiance:
+    """The radiance at a depth, in a direction."""
+
+    depth: float
+    mu: float
+    phi: float  #: [degrees]
+    value: Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class TotalLight:
+    """The light of all orders."""
+
+    reflectance: Number
+    transmittance: Number
+    flux: tuple[Flux, ...]
+    radiance: tuple[Radiance, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlabLight:
+    """The light of a slab, or the error of each of its numbers."""
+
+    orders: tuple[OrderLight, ...]
+    total: TotalLight
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhotonLight(SlabLight):
+    """The light of a slab by photons."""
+
+    count: int
+    seed: int
+    standard_error: SlabLight
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlabNumbers(SlabLight):
+    """All numbers of a slab."""
+
+    tau: float
+    sun: float
+    albedo: float
+    phase: str
+    error: SlabLight  #: the estimated error of every number
+    photons: PhotonLight | None = None  #: that check them
+
+
 def slab_numbers(
     request: SlabRequest, *, photons: int = 0, seed: int = 0, progress: Progress | None = None
-) -> dict[str, Any]:
-    """Return all numbers of a slab.
-
-    `tau`, `sun`, `albedo`, `phase`, `orders`, `total`; `error`, with the estimated error of every number of `orders`
-    and `total` in its place; with photons that check them `photons`: their `count` and `seed`, `orders` and `total` by
-    them, and in `standard_error` the standard error of each.
-    """
+) -> SlabNumbers:
+    """Return all numbers of a slab."""
     tell = progress or (lambda share, what: None)
     tell(0.0, "orders")
     streams = needed_streams(request.phase.deterministic)
@@ -68,7 +150,7 @@ def slab_numbers(
             "standard_error": _estimated(request, estimate, "error"),
         }
     tell(1.0, "done")
-    return record
+    return record_of(record, SlabNumbers)
 
 
 def expected_seconds(request: SlabRequest, photons: int) -> float:
