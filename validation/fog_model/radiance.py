@@ -151,9 +151,8 @@ class FogModel:
     def transmittance(self, fog: Fog) -> Array:
         """Return the fraction of light that the rays leave of what is at their ends, (m, 3) [1]."""
         view = self.view
-        slant = 1.0 if fog.spherical else 1 / (view.reference.direction @ view.axis)
-        length = view.length.copy()
-        length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * slant) - fog.near * slant, 0.0)
+        slant = 1 / (view.reference.direction @ view.axis)
+        length = _cut(view.length, fog, slant)
         if fog.height is not None:
             origin, rise = view.reference.origin @ fog.up, view.reference.direction @ fog.up
             end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
@@ -201,13 +200,7 @@ class FogModel:
 
     def _camera_lengths(self, places: Places, fog: Fog, slant: Array) -> Array:
         flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
-        camera = places.camera / slant[:, None] if flat else places.camera
-        if fog.near > 0 or np.isfinite(fog.far):
-            plane: Any = 1.0 if fog.spherical else slant
-            camera = camera.copy()
-            around = np.minimum(camera[:, AROUND], fog.far * plane) - fog.near * plane
-            camera[:, AROUND] = np.maximum(around, 0.0)
-        return camera
+        return _cut(places.camera / slant[:, None] if flat else places.camera, fog, slant)
 
     def _by_height(
         self, places: Places, fog: Fog, number: int, camera: Array, light: Array, away: Array
@@ -240,6 +233,14 @@ class FogModel:
             own = (reference.medium, *reference.media)[medium].phase
             self._phases[key] = np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
         return self._phases[key]
+
+
+def _cut(length: Array, fog: Fog, slant: Array) -> Array:
+    """Return lengths from the camera in each medium, of that without bounds what lies between its ends, (n, media)."""
+    plane: Any = 1.0 if fog.spherical else slant
+    cut = length.copy()
+    cut[:, AROUND] = np.maximum(np.minimum(cut[:, AROUND], fog.far * plane) - fog.near * plane, 0.0)
+    return cut
 
 
 def _falls(r: Array, fog: Fog) -> Array:
