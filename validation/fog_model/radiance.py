@@ -44,7 +44,6 @@ class Fog:
     sigma_t: tuple[Colour, ...]  #: extinction [1/m]; of height fog a factor on its density
     albedo: tuple[Colour, ...]  #: single-scattering albedo [1]
     phase: tuple[float | PhaseLaw | None, ...]  #: g of Henyey and Greenstein's function, or a law; None: the scene's
-    intensity: tuple[float, ...]  #: factors on the lights [1]
     airlight: tuple[float, ...]  #: factors on what the media scatter of each light [1]
     surface: tuple[float, ...]  #: factors on what surfaces reflect of each light [1]
     moved: tuple[Colour, ...]  #: how far the lights are from where the paths begin, x, y, z [m]
@@ -64,12 +63,6 @@ class Fog:
     height: HeightFog | None = None  #: how the density of the medium without bounds depends on height
     up: Colour = (0.0, 0.0, 1.0)  #: unit vector along which heights are
 
-    def with_entry(self, name: str, number: int, value: Any) -> "Fog":
-        """Return the fog with another entry of one of its tuples, such as the `sigma_t` of a medium."""
-        old = getattr(self, name)
-        entry: dict[str, Any] = {name: (*old[:number], value, *old[number + 1 :])}
-        return replace(self, **entry)
-
     @property
     def ends(self) -> Ends | None:
         """Between what along the rays it is; None where all of them are in it."""
@@ -81,12 +74,12 @@ class Fog:
     @property
     def without_factors(self) -> "Fog":
         """The fog without what multiplies the light of each source, see `combined`."""
-        one = (1.0,) * len(self.intensity)
-        return replace(self, intensity=one, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0))
+        one = (1.0,) * len(self.airlight)
+        return replace(self, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0))
 
     def combined(self, by_light: Array) -> Array:
         """Return airlight and surfaces, (2, m, 3), from what `FogModel.by_light` returns."""
-        factors = np.array([self.airlight, self.surface]) * np.array(self.intensity)
+        factors = np.array([self.airlight, self.surface])
         return np.asarray(np.einsum("kl,klpc->kpc", factors, by_light) * np.array(self.exposure))
 
 
@@ -99,7 +92,6 @@ def scene_fog(reference: ReferenceScene) -> Fog:
         sigma_t=tuple(colour(each.sigma_t) for each in media) if height is None else ((1.0, 1.0, 1.0),),
         albedo=tuple(colour(medium.albedo) for medium in media),
         phase=tuple(medium.phase.g if medium.phase.name == "hg" else None for medium in media),
-        intensity=one,
         airlight=one,
         surface=one,
         moved=((0.0, 0.0, 0.0),) * len(one),

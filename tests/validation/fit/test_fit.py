@@ -112,7 +112,7 @@ def test_each_of_several_lights_has_a_factor(variant, tmp_path):
     reference = read_reference(load_scene(scene).scene)
     pixels = SIZE[0] * SIZE[1]
     model = ImageModel.of(Seen(reference, np.ones((pixels, 3)), "airlight", np.ones(pixels, bool)))
-    bright = model.radiance(replace(model.fog, intensity=(1.4, 0.3)))
+    bright = model.radiance(replace(model.fog, airlight=(1.4, 0.3), surface=(1.4, 0.3)))
     image = Image({"airlight": bright.reshape(SIZE[1], SIZE[0], 3)})
     fit = fitted(image, scene, ["intensity", "sigma_t"])
     values = {each.name: each.value for each in fit.parameters}
