@@ -189,29 +189,18 @@ class Optics:
 
 
 @lru_cache(maxsize=32)
-def optics(
-    droplets: Droplets | None = None,
-    wavelength: float = 0.55,
-    *,
-    index: complex | None = None,
-    sizes: int | None = None,
-) -> Optics:
+def optics(droplets: Droplets | None = None, wavelength: float = 0.55, *, sizes: int | None = None) -> Optics:
     """Return how droplets extinguish and scatter light.
 
-    `droplets`: their sizes; those of Bouthors 2008 by default; `wavelength`: of the light in air [um], 0.2 to 2;
-    `index`: of refraction of the droplets [1]; that of water for the three `WAVELENGTHS`, to be given for others;
-    `sizes`: how many sizes are averaged; `Droplets.sizes` by default. Raises InputError for a wavelength without an
-    index, or out of range.
+    `droplets`: their sizes; those of Bouthors 2008 by default; `wavelength`: of the light in air [um], one of `WATER`;
+    `sizes`: how many sizes are averaged; `Droplets.sizes` by default. Raises InputError for another wavelength.
 
     Valid for all `Droplets`. Takes some seconds at r_e = 6 um, and a minute at 50 um; the results are kept.
     """
     kinds = droplets or Droplets()
-    if not 0.2 <= wavelength <= 2:
-        raise InputError(f"the wavelength is {wavelength} um; wanted 0.2 to 2 um")
-    if index is None and wavelength not in WATER:
-        known = ", ".join(f"{each:g}" for each in WATER)
-        raise InputError(f"the wavelength is {wavelength} um; give the refractive index of water there, or use {known}")
-    m = complex(WATER[wavelength] if index is None else index)
+    if wavelength not in WATER:
+        raise InputError(f"the wavelength is {wavelength} um; wanted {', '.join(f'{each:g}' for each in WATER)} um")
+    m = complex(WATER[wavelength])
     radius, weight = kinds.nodes(sizes or kinds.sizes)
     x = 2 * np.pi * radius / wavelength
     count = terms(float(x[-1]))

@@ -115,15 +115,13 @@ class Crossings:
     """Crossings, nearest first."""
 
     key: list[Any]
-    gain: list[Any]  #: of each; empty where crossings have none
+    gain: list[Any]  #: of each
 
 
-def filled(key: float, places: int, Float, width: int, *, gains: bool = True) -> Crossings:
+def filled(key: float, places: int, Float, width: int) -> Crossings:
     """Return a queue of so many places that holds one key in all of them, without gain, for `width` lanes."""
-    return Crossings(
-        [dr.full(Float, key, width) for _ in range(places)],
-        [dr.zeros(Float, width) for _ in range(places if gains else 0)],
-    )
+    keys, gains = ([dr.full(Float, value, width) for _ in range(places)] for value in (key, 0))
+    return Crossings(keys, gains)
 
 
 def insert(queue: Crossings, key, gain):
@@ -133,14 +131,13 @@ def insert(queue: Crossings, key, gain):
     farthest of all.
     """
     keys, gains, new = [], [], key
-    for place, held in enumerate(queue.key):
+    for held, held_gain in zip(queue.key, queue.gain, strict=True):
         keys.append(dr.maximum(held, key))
         key = dr.minimum(held, key)
-        if queue.gain:
-            # Compare with the new key, not with the one that it displaced: equal keys must keep their order.
-            before = new > held
-            gains.append(dr.select(before, gain, queue.gain[place]))
-            gain = dr.select(before, queue.gain[place], gain)
+        # Compare with the new key, not with the one that it displaced: equal keys must keep their order.
+        before = new > held
+        gains.append(dr.select(before, gain, held_gain))
+        gain = dr.select(before, held_gain, gain)
     return Crossings(keys, gains), key, gain
 
 

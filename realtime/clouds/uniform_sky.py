@@ -84,10 +84,10 @@ def escapes(phase: SlabPhase, albedo: float) -> Array:
     return np.asarray(arrays["shares"])
 
 
-def slab_escapes(tau: float, phase: SlabPhase, albedo: float, *, streams: int = _STREAMS) -> Array:
+def slab_escapes(tau: float, phase: SlabPhase, albedo: float) -> Array:
     """Return the shares of a slab of the thickness `tau`, (cosines, sets); see `escapes`."""
-    rule = double_gauss(streams)
-    moments = phase.moments(2 * streams + 1)
+    rule = double_gauss(_STREAMS)
+    moments = phase.moments(2 * _STREAMS + 1)
     peak = float(moments[-1])
     kept = moments[:-1] - peak
     scatter = albedo / 2 * mode_kernel(0, kept, rule.mu, rule.mu) * rule.weights

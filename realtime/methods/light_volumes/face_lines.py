@@ -210,10 +210,10 @@ def cell_at(pair, per, t, low, side):
     return mi.UInt32(dr.clip(dr.select(t >= end, cell + step, dr.select(t < begin, cell - step, cell)), first, last))
 
 
-def borders(low, start, per, across=1.0):
-    """Return the t at which a line enters and leaves the strip from `low` to `low + across` [texels].
+def borders(low, start, per):
+    """Return the t at which a line enters and leaves the strip from `low` to `low + 1` [texels].
 
     The line is at `start` [texels] for t = 0 and needs `per` for a texel.
     """
-    at_low, at_high = (low - start) * per, (low + across - start) * per
+    at_low, at_high = (low - start) * per, (low + 1 - start) * per
     return dr.minimum(at_low, at_high), dr.maximum(at_low, at_high)
