@@ -95,7 +95,7 @@ class Scaling:
     scene: str = column(meaning="of the study")
     size: tuple[int, int] = column(unit="pixels", meaning="of its images")
     label: str = column(meaning="the method")
-    kind: Literal["size", "triangles", "lights", "media", "map"] = column(meaning="what grows")
+    kind: Literal["size", "triangles", "lights", "map"] = column(meaning="what grows")
     costs: tuple[StepCost, ...] = column(meaning="by step: the `work`, times of frames and of the camera `rays` alone")
     growth: Mapping[str, TimeGrowth] = column(
         meaning="of a time by name: `exponent` of the fit time ~ work^exponent, its `standard_error`, the `steepest` "

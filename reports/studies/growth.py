@@ -40,7 +40,7 @@ def scaling(
 ) -> Study:
     """Time methods as their work grows.
 
-    The result has times, memory and exponents by pixels, triangles, lights, bounded media or texels of the map. The
+    The result has times, memory and exponents by pixels, triangles, lights or texels of the map. The
     exit status is 1 if a time jumps.
 
     Parameters
@@ -48,7 +48,7 @@ def scaling(
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files; colonnade by default.
     kinds
-        What grows: some of size,triangles,lights,media,map; all but media by default.
+        What grows: some of size,triangles,lights,map; all by default.
     method
         A method, as in `airlight study methods`; by default one configuration of each method with shadows.
     size

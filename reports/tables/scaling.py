@@ -11,7 +11,6 @@ WORK = {
     "size": "pixels",
     "triangles": "triangles",
     "lights": "lights",
-    "media": "bounded media",
     "map": "texels on a side of the map",
 }
 TIMES = {"frame": "frame", "light_moved": "light moved", "objects_moved": "objects moved"}

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr, ndtri, stdtr, stdtrit
+from scipy.special import ndtri, stdtr, stdtrit
 from scipy.stats import binom, binomtest, kstest, quantile_test, spearmanr
 
 Array = NDArray[np.float64]
@@ -38,14 +38,12 @@ def two_sided_p(z: Array, freedom: Array) -> Array:
 
     `z` and `freedom` have one shape, (n,) [1].
     """
-    tail = -np.abs(z)
-    finite = np.isfinite(freedom)
-    return 2 * np.where(finite, stdtr(np.where(finite, freedom, 1.0), tail), ndtr(tail))
+    return np.asarray(2 * stdtr(freedom, -np.abs(z)))
 
 
 def student_quantile(probability: float, freedom: float) -> float:
     """Return the quantile [1] at a `probability` of Student's law; of the normal law for an infinite `freedom`."""
-    return float(stdtrit(freedom, probability) if np.isfinite(freedom) else ndtri(probability))
+    return float(stdtrit(freedom, probability))
 
 
 def student(values: Array) -> tuple[float, float]:

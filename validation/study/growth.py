@@ -9,7 +9,6 @@ costs, whatever the work, makes that of times smaller. Between two steps a time 
 | pixels | 1 | 1 | 1 | each ray is by itself |
 | triangles | 1/2 | 1 | 1 | rays meet silhouettes; what is prepared looks at every triangle |
 | lights | 1 | 1 | 1 | one after the other |
-| media | 1 | 1 | 1 | one after the other |
 | texels on a side of a map | 1 | 2 | 2 | a ray crosses a row of texels; the map has their square |
 
 A step that is steeper by more than `CLIFF` is a cliff, where it takes longer than `_SHORT`: something overflows there.
@@ -68,7 +67,6 @@ USUAL = {
     "size": (1.0, 1.0, 1.0),
     "triangles": (0.5, 1.0, 1.0),
     "lights": (1.0, 1.0, 1.0),
-    "media": (1.0, 1.0, 1.0),
     "map": (1.0, 2.0, 2.0),
 }
 

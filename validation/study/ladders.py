@@ -6,7 +6,6 @@
 | `size` | pixels | the image has half, twice and four times the width and height |
 | `triangles` | triangles of opaque meshes | each is cut into four, with bumps (see below) |
 | `lights` | lights without extent | each stands beside itself again, with its fraction of the intensity |
-| `media` | bounded media | the last ones are left out |
 | `map` | texels on a side of a shadow map | the parameter `map` |
 
 The other kinds keep the image at the size that is asked for.
@@ -34,7 +33,6 @@ from analytic.errors import InputError
 from realtime.scene.animate import turned_light
 from realtime.scene.lights import Light
 from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
-from realtime.scene.read_media import sort_shapes
 from realtime.scene.read_scene import Scene, read_scene
 from validation.scenes.loading import load_scene
 from validation.scenes.meshes import divided, rotation
@@ -65,7 +63,7 @@ def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
 
     A scene that has nothing of the kind of which there could be less or more is refused.
     """
-    makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "media": _media, "map": _maps}
+    makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "map": _maps}
     if kind not in makers:
         raise InputError(f"scaling: got {kind!r}, wanted some of {', '.join(GROWTH)}, with commas between them")
     return makers[kind](name_or_path, size)
@@ -123,23 +121,6 @@ def _copy(light: Light, number: int, copies: int, camera) -> Light:
     step = _ASIDE * np.linalg.norm(position - camera)
     aside = step * number**0.5 * np.array([np.cos(2.4 * number), np.sin(2.4 * number), 0.3 * np.cos(1.7 * number)])
     return replace(light, position=type(light.position)(*(float(c) for c in position + aside)))
-
-
-def _media(name: str, size: tuple[int, int]) -> list[Step]:
-    boundaries = sort_shapes(load_scene(name, size).scene)[1]
-    if len(boundaries) < 2:
-        raise InputError(
-            f"scaling media: {name} has {len(boundaries)} bounded media, wanted two or more; use three-media, or a "
-            "scene of your own"
-        )
-    return [Step(count, partial(_fewer_media, name, size, count)) for count in range(1, len(boundaries) + 1)]
-
-
-def _fewer_media(name: str, size: tuple[int, int], count: int) -> Scene:
-    """Return a scene with the first of its bounded media."""
-    scene = load_scene(name, size).scene
-    left_out = {shape.id() for shape in sort_shapes(scene)[1][count:]}
-    return read_scene(with_shapes(scene, [shape for shape in scene.shapes() if shape.id() not in left_out]))
 
 
 def _maps(name: str, size: tuple[int, int]) -> list[Step]:

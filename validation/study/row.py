@@ -78,8 +78,8 @@ class Cost:
 class Growth:
     """A step of a kind of work, of which there is more and less (`validation.study.ladders`)."""
 
-    kind: str = column("work", meaning="'size', 'triangles', 'lights', 'media' or 'map'")
-    amount: float = column("amount", "1", "pixels, triangles, lights, bounded media, or texels on a side of the map")
+    kind: str = column("work", meaning="'size', 'triangles', 'lights' or 'map'")
+    amount: float = column("amount", "1", "pixels, triangles, lights, or texels on a side of the map")
     rays: Timing | None = column("rays alone", meaning="camera rays without shading", default=None)
 
 

@@ -70,7 +70,7 @@ SIZE = (160, 120)  #: of the images where a study gives none [pixels]
 
 #: The studies of reports, and the kinds of work by which times may grow.
 STUDIES = ("quick", "default", "full")
-GROWTH = ("size", "triangles", "lights", "media", "map")
+GROWTH = ("size", "triangles", "lights", "map")
 
 _FOLDER = Path(__file__).parent / "studies"
 

@@ -60,7 +60,7 @@ MISTAKES = (
     ("study slab 2 30 --albedo 1.2", "albedo"),
     ("study map-size omni-box --sizes 12", "map: got 12, wanted a power of two"),
     ("study map-size omni-box --set map=64", "got map=64, wanted it in sizes"),
-    ("study scaling open-fog --kinds media", "0 bounded media"),
+    ("study scaling open-fog --kinds triangles", "0 triangles"),
     ("study methods open-fog --method froxel-fog --set slice=9", "did you mean 'slices'"),
     ("study slabs", 'Did you mean "slab"'),
     ("report --quick --full", "both quick and full"),
