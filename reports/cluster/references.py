@@ -21,7 +21,7 @@ from reference.storage.kept import Spent, fresh_results, fresh_since, stopwatch
 from reports.cluster.connect import Client, facts
 from reports.cluster.run import Group, Task, run_groups
 from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
-from validation.estimates.quadrature import kept_reference, reference_image
+from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 
 _LIMIT = 6 * 3600.0  # of a reference or a batch [s]
@@ -48,12 +48,12 @@ class Picture:
 
 def bring_references(cluster: Client, pictures: Sequence[Picture], *, pixel: str = "centre") -> None:
     """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here."""
-    lacking = [picture for picture in pictures if not kept_reference.is_kept(picture.load(), pixel=pixel)]
+    lacking = [picture for picture in pictures if not reference_image.is_kept(picture.load(), pixel=pixel)]
     named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
     given = pixel, fresh_since()
     groups = [Group((Task(name, _reference, (picture, *given), _LIMIT),)) for name, picture in named.items()]
     for name, value in _done(cluster, groups):
-        kept_reference.keep(*value, named[name].load(), pixel=pixel)
+        reference_image.keep(*value, named[name].load(), pixel=pixel)
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:

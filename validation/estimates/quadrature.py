@@ -47,26 +47,19 @@ Progress = Callable[[int, int, str], None]
 _ROUNDING = 2.0**-24
 
 
+@kept("quadrature", quadrature_image)
 def reference_image(
-    scene, *, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", progress: Progress | None = None
+    scene, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", *, progress: Progress | None = None
 ) -> ReferenceImage:
     """Return the quadrature reference of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
     `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`.
     Radiance that is not finite is refused.
     """
-    return kept_reference(scene, checks, shadow_scale, pixel, progress=progress)
-
-
-@kept("quadrature", quadrature_image)
-def kept_reference(
-    scene, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", *, progress: Progress | None = None
-) -> ReferenceImage:
-    """Return what `reference_image` does; it is kept."""
     reference = read_reference(scene)
     settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
     # Only area lights take so long that a run is worth going on with.
-    keep = _parts(kept_reference.key(scene, **settings)) if reference.area and pixel == "centre" else None
+    keep = _parts(reference_image.key(scene, **settings)) if reference.area and pixel == "centre" else None
     return _checked_image(reference, settings, keep=keep, progress=progress)
 
 

@@ -27,7 +27,7 @@ from validation.columns import record_of
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.estimates.quadrature import kept_reference, reference_image
+from validation.estimates.quadrature import reference_image
 from validation.metrics.flip import Flip, flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
 from validation.statistics.records import Agreement, MultipleScattering
@@ -76,7 +76,7 @@ class SceneStudy:
     @cached_property
     def kept_reference(self) -> Kept[ReferenceImage]:
         """The quadrature reference at pixel centres, and what it took."""
-        return kept_reference.result(self.loaded.scene)
+        return reference_image.result(self.loaded.scene)
 
     @property
     def reference(self) -> ReferenceImage:
@@ -129,7 +129,7 @@ class SceneStudy:
         """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
         lights = len(self.scene.lights) + 16 * len(self.scene.area_lights)
         checks, parts = self.study.checks, dict[str, float]()
-        kept = kept_reference.is_kept(self.loaded.scene)
+        kept = reference_image.is_kept(self.loaded.scene)
         parts["reference"] = 0.0 if kept else reference_work(self.size, lights=lights).seconds
         with self.at(checks.size) as scene:
             kept = check_reference.is_kept(scene, checks)
