@@ -510,9 +510,7 @@ _TRACED_WIDE = _all(
             _TRACED, "dr.select(counts_, density, 0)", "dr.select(counts_, 1 / light.area, 0)"
         ),
         "traced-area-chord-density": Rewrite(
-            _TRACED,
-            "0.5 * share_ / (4 * math.pi * radius_ * chord_)",
-            "share_ / (4 * math.pi * radius_ * chord_)",
+            _TRACED, "0.5 * share_ / (4 * math.pi * radius_ * chord_)", "share_ / (4 * math.pi * radius_ * chord_)"
         ),
         "traced-area-sphere-evenly": Rewrite(
             _TRACED, "(1 - share_) * (1 + dr.dot(n_, side_)) / area_", "(1 - share_) / area_"
@@ -532,17 +530,7 @@ _TRACED_WIDE = _all(
 #: Below the margin on purpose: what the comparison cannot see.
 BELOW_THE_MARGIN = Mutation("one-in-ten-thousand", "quadrature", "many-lights", _brighter(1.0001))
 
-MUTATIONS = (
-    *_FOG,
-    *_MESHES,
-    *_RAYLEIGH,
-    *_SUN,
-    *_WIDE,
-    *_TRACED_FOG,
-    *_TRACED_MESHES,
-    *_TRACED_SUN,
-    *_TRACED_WIDE,
-)
+MUTATIONS = (*_FOG, *_MESHES, *_RAYLEIGH, *_SUN, *_WIDE, *_TRACED_FOG, *_TRACED_MESHES, *_TRACED_SUN, *_TRACED_WIDE)
 
 #: Faults of what all estimators share: they agree all the same, and the certified scenes must find the fault.
 SHARED = _all(

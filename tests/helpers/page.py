@@ -2,13 +2,16 @@
 """A small report by hand, with its EXR files, and its page as a reader of HTML sees it."""
 
 import copy
+import json
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image as Picture
 
 from reference.storage.exr import Image, write_exr
+from reports.data.reader import named_files
 from reports.data.records import Report
 from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene, settings
 
@@ -66,37 +69,23 @@ def method(label, **changes):
 
 
 AGREEMENT = agreement(margin=0.005, detectable=0.0021, relative_bias_ci=[-0.0011, 0.0014])
+_FLAT = {"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"}
+_REFERENCE = {"mean": 0.98765, "relative_bound": 1.2e-6, "transitions": 4321, "missed": 0.0007}
+_REFERENCE |= {"checked": 98765, "disagreements": 12, "refined": 11, "left": 1}
+_HALL = scene(
+    "hall",
+    [method("good (k)"), method("flat", knows_shadows=False, files=_FLAT)],
+    purpose="A hall.",
+    published="Billeter 2010",
+    size=[WIDTH, HEIGHT],
+    plan={"shadows": "visibility tests", "medium": "unbounded"},
+    reference=_REFERENCE,
+    agreement={"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
+    exposure=2.5,
+    files={"picture": "s/reference.png", "exr": "s/reference.exr", "airlight": "s/reference-airlight.png"},
+)
 DATA: dict[str, Any] = report_of(
-    [
-        scene(
-            "hall",
-            [
-                method("good (k)"),
-                method(
-                    "flat",
-                    knows_shadows=False,
-                    files={"picture": "s/flat.png", "error": "s/flat-error.png", "exr": "s/flat.exr"},
-                ),
-            ],
-            purpose="A hall.",
-            published="Billeter 2010",
-            size=[WIDTH, HEIGHT],
-            plan={"shadows": "visibility tests", "medium": "unbounded"},
-            reference={
-                "mean": 0.98765,
-                "relative_bound": 1.2e-6,
-                "transitions": 4321,
-                "missed": 0.0007,
-                "checked": 98765,
-                "disagreements": 12,
-                "refined": 11,
-                "left": 1,
-            },
-            agreement={"airlight": AGREEMENT, "surface": AGREEMENT | {"layer": "surface"}},
-            exposure=2.5,
-            files={"picture": "s/reference.png", "exr": "s/reference.exr", "airlight": "s/reference-airlight.png"},
-        )
-    ],
+    [_HALL],
     created="2026-11-21 12:34:56 +0000",
     command="airlight report --quick",
     seconds=12.3,
@@ -133,6 +122,16 @@ def write_files(folder: Path) -> Path:
     (folder / "s").mkdir(parents=True, exist_ok=True)
     for name, layers in images().items():
         write_exr(folder / "s" / f"{name}.exr", Image(layers), finite=False)
+    return folder
+
+
+def write_report_files(folder: Path) -> Path:
+    """Write a whole report but for its page; pictures are of a few pixels."""
+    write_files(folder)
+    for name in named_files(small_report()):
+        if not (folder / name).exists():
+            Picture.new("RGB", (6, 4)).save(folder / name, "PNG")
+    (folder / "report.json").write_text(json.dumps(DATA), encoding="utf-8")
     return folder
 
 

@@ -75,26 +75,11 @@ def entry(label: str, relative_rmse: float | None = 0.01, median: float = 2.0, *
     """Return what a report says of a configuration, which takes so many milliseconds a frame."""
     name, _, inside = label.partition(" (")
     kernel = inside.rstrip(")").split(", ")[0]
-    return {
-        "label": label,
-        "kind": "built-in",
-        "layer": "airlight",
-        "method": name,
-        "kernel": kernel if kernel and "=" not in kernel else None,
-        "parameters": {},
-        "knows_shadows": True,
-        "refused": None,
-        "left_out": False,
-        "note": None,
-        "times": {stage: timing(share * median) for stage, share in _STAGES.items()},
-        "error": errors(relative_rmse),
-        "surface_error": None,
-        "flip": None,
-        "files": {},
-        "measured": WHEN,
-        "seconds": 1.5,
-        "cached": False,
-    } | changes
+    made = {"label": label, "kind": "built-in", "layer": "airlight", "method": name, "parameters": {}, "files": {}}
+    made |= {"kernel": kernel if kernel and "=" not in kernel else None, "knows_shadows": True, "left_out": False}
+    made |= {"times": {stage: timing(share * median) for stage, share in _STAGES.items()}}
+    made |= {"error": errors(relative_rmse), "measured": WHEN, "seconds": 1.5, "cached": False}
+    return made | dict.fromkeys(("refused", "note", "surface_error", "flip")) | changes
 
 
 def refused(label: str, why: str, **changes: Any) -> dict[str, Any]:
@@ -118,20 +103,10 @@ def agreement(
     **statistics: Any,
 ) -> dict[str, Any]:
     """Return the comparison of the reference with an estimator."""
-    known: dict[str, Any] = {
-        "relative_bias": 1.7e-4,
-        "relative_bias_ci": [0.0 if equivalent else -0.02, 0.001],
-        "relative_bias_ci_batches": None,
-        "margin": margin,
-        "equivalent": equivalent,
-        "detectable_bias": detectable,
-        "z_mean": 0.013,
-        "z_std": 1.021,
-        "rejected": 3,
-        "expected_rejections": 0.01,
-        "family_level": 0.01,
-        "plain_level": 0.01,
-    }
+    known: dict[str, Any] = {"margin": margin, "equivalent": equivalent, "detectable_bias": detectable}
+    known |= {"relative_bias": 1.7e-4, "relative_bias_ci": [0.0 if equivalent else -0.02, 0.001]}
+    known |= {"relative_bias_ci_batches": None, "z_mean": 0.013, "z_std": 1.021, "rejected": 3}
+    known |= {"expected_rejections": 0.01, "family_level": 0.01, "plain_level": 0.01}
     for each in fields(Statistics):
         known.setdefault(each.name, 0)
     run = {"width": 160, "height": 120, "batches": 48, "samples": 64, "epsilon": 8.94e-4, "masked": 11}
@@ -152,48 +127,20 @@ def share(value: float) -> dict[str, Any]:
 
 def scene(name: str, methods: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
     """Return what a report says of a scene."""
-    return {
-        "name": name,
-        "purpose": f"A {name}.",
-        "published": "",
-        "path": None,
-        "size": [320, 240],
-        "timed": [320, 240],
-        "plan": {"shadows": "visibility tests", "medium": "unbounded", "lights": "1 point", "extinction": "one"},
-        "notes": [],
-        "reference": reference(),
-        "exposure": 1.0,
-        "agreement": {"volpath airlight": agreement()},
-        "multiple": {"medium": share(0.123), "everything": share(0.21), "max_depth": 64, "batches": 4, "samples": 1},
-        "files": {
-            "exr": f"{name}/reference.exr",
-            "picture": f"{name}/reference.png",
-            "airlight": f"{name}/reference-airlight.png",
-        },
-        "methods": methods,
-        "seconds": {"reference": 0.5},
-    } | changes
+    made = {"name": name, "purpose": f"A {name}.", "published": "", "path": None, "notes": [], "exposure": 1.0}
+    made |= {"size": [320, 240], "timed": [320, 240], "reference": reference(), "methods": methods}
+    made |= {"plan": {"shadows": "visibility tests", "medium": "unbounded", "lights": "1 point", "extinction": "one"}}
+    multiple = {"medium": share(0.123), "everything": share(0.21), "max_depth": 64, "batches": 4, "samples": 1}
+    made |= {"agreement": {"volpath airlight": agreement()}, "multiple": multiple, "seconds": {"reference": 0.5}}
+    files = {"exr": "reference.exr", "picture": "reference.png", "airlight": "reference-airlight.png"}
+    return made | {"files": {kind: f"{name}/{file}" for kind, file in files.items()}} | changes
 
 
 def settings(**changes: Any) -> dict[str, Any]:
     """Return an effort."""
-    return {
-        "name": "quick",
-        "scenes": [],
-        "image": [320, 240],
-        "timed": [320, 240],
-        "checked": [64, 48],
-        "margins": {"volpath": 0.01},
-        "seconds": 0.1,
-        "samples": 4,
-        "batches": 8,
-        "multiple": [4, 1],
-        "patience": 1.0,
-        "slow": 1.0,
-        "limit": 1.0,
-        "flip": "none",
-        "rays": 0,
-    } | changes
+    made = {"name": "quick", "scenes": [], "image": [320, 240], "timed": [320, 240], "checked": [64, 48]}
+    made |= {"margins": {"volpath": 0.01}, "seconds": 0.1, "samples": 4, "batches": 8, "multiple": [4, 1]}
+    return made | {"patience": 1.0, "slow": 1.0, "limit": 1.0, "flip": "none", "rays": 0} | changes
 
 
 def environment(**changes: Any) -> dict[str, Any]:
@@ -210,21 +157,11 @@ def stable(kernel: str, *broken: str) -> dict[str, Any]:
 
 def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
     """Return the content of a report."""
-    return {
-        "schema": "airlight-report/2",
-        "created": "2026-11-21 12:00:01 +0000",
-        "command": "airlight report",
-        "seconds": 2.0,
-        "parts": {"scenes": 2.0},
-        "cached": 0,
-        "computed": 4,
-        "measured": {"first": WHEN, "last": WHEN},
-        "settings": settings(),
-        "environment": environment(),
-        "claims": [{"kind": "reference", "text": "The reference is confirmed by volpath.", "good": True}],
-        "scenes": scenes,
-        "stability": [],
-    } | changes
+    made = {"schema": "airlight-report/2", "created": "2026-11-21 12:00:01 +0000", "command": "airlight report"}
+    made |= {"seconds": 2.0, "parts": {"scenes": 2.0}, "cached": 0, "computed": 4}
+    made |= {"measured": {"first": WHEN, "last": WHEN}, "settings": settings(), "environment": environment()}
+    made |= {"claims": [{"kind": "reference", "text": "The reference is confirmed by volpath.", "good": True}]}
+    return made | {"scenes": scenes, "stability": []} | changes
 
 
 # --- reports to compare ----------------------------------------------------------------------------------------------

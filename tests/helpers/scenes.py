@@ -73,3 +73,17 @@ def clear_scene(*, size=(16, 12), **changes: Any) -> dict[str, Any]:
     scene = tiny_scene(size=size, fog=None, ball=None, floor=None)
     scene["sensor"] = {key: entry for key, entry in scene["sensor"].items() if key != "medium"}
     return {name: entry for name, entry in (scene | changes).items() if entry is not None}
+
+
+LAMP = '<emitter type="point" id="lamp"><point name="position" value="0.7, 0.3, 1.9"/></emitter>'
+FOG = '<float name="sigma_t" value="0.31"/><float name="albedo" value="0.83"/>'
+
+
+def scene_xml(*parts: str, fog: str = FOG, size: tuple[int, int] = (32, 24), fov: float = 39.3) -> str:
+    """Return a scene file of a ball in fog under a lamp, or with `parts` instead of the lamp."""
+    width, height = size
+    return f"""<scene version="3.0.0"><medium type="homogeneous" id="fog">{fog}</medium>
+<sensor type="perspective"><float name="fov" value="{fov}"/><ref name="medium" id="fog"/><transform name="to_world">
+<lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
+<film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/></film></sensor>
+<shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape>{"".join(parts or (LAMP,))}</scene>"""

@@ -30,45 +30,18 @@ def row(scene="random:0", method="ray-march", kernel=None, parameters=None, **ch
     parameters = parameters or {}
     seed = int(scene.removeprefix("random:")) if scene.startswith("random:") else None
     identity = (scene, method, kernel, parameters, changes.get("medium"), changes.get("width"), changes.get("height"))
-    values = {
-        "key": hashlib.sha256(json.dumps(identity).encode()).hexdigest(),
-        "study": "test",
-        "scene": scene,
-        "seed": seed,
-        "method": method,
-        "kernel": kernel,
-        "parameters": json.dumps(parameters),
-        "label": label(method, kernel, parameters),
-        "width": 160,
-        "height": 120,
-        "status": "done",
-        "attempts": 1,
-        "error.pixels": 19200,
-        "error.nonfinite": 0,
-        "error.negative": 0,
-        "error.rmse": 0.01,
-        "error.relative_rmse": 0.01,
-        "error.relative_bias": 0.002,
-        "error.p50": 0.001,
-        "error.p99": 0.05,
-        "reference.estimator": "quadrature",
-        "reference.error": 1e-7,
-        "reference.seconds": 0.5,
-        "times.frame.median_ms": 3.0,
-        "times.frame.low_ms": 2.9,
-        "times.frame.high_ms": 3.2,
-        "cost.alone": True,
-        "origin.host": "here",
-        "origin.device": "a processor",
-        "origin.variant": "llvm_ad_rgb",
-        "origin.threads": 2,
-        "origin.started": "2026-11-23T08:30:00Z",
-        "origin.airlight": "0.1.0",
-        "origin.mitsuba": "3.9.1",
-        "origin.drjit": "1.5.0",
-        "origin.python": "3.11.2",
-        "command": f"airlight compare {scene} --method {method}",
-    }
+    values = {"key": hashlib.sha256(json.dumps(identity).encode()).hexdigest(), "study": "test", "scene": scene}
+    values |= {"seed": seed, "method": method, "kernel": kernel, "parameters": json.dumps(parameters)}
+    values |= {"label": label(method, kernel, parameters), "width": 160, "height": 120, "status": "done", "attempts": 1}
+    error = {"pixels": 19200, "nonfinite": 0, "negative": 0, "rmse": 0.01, "relative_rmse": 0.01}
+    error |= {"relative_bias": 0.002, "p50": 0.001, "p99": 0.05}
+    frame = {"median_ms": 3.0, "low_ms": 2.9, "high_ms": 3.2}
+    origin = {"host": "here", "device": "a processor", "variant": "llvm_ad_rgb", "threads": 2, "airlight": "0.1.0"}
+    origin |= {"started": "2026-11-23T08:30:00Z", "mitsuba": "3.9.1", "drjit": "1.5.0", "python": "3.11.2"}
+    reference = {"estimator": "quadrature", "error": 1e-7, "seconds": 0.5}
+    parts = {"error": error, "reference": reference, "times.frame": frame, "origin": origin, "cost": {"alone": True}}
+    values |= {f"{part}.{name}": value for part, own in parts.items() for name, value in own.items()}
+    values["command"] = f"airlight compare {scene} --method {method}"
     values |= {column_of(name): value for name, value in changes.items()}
     if values["status"] != "done":
         values = {name: None if name.startswith(("error.", "times.", "cost.")) else values[name] for name in values}

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: a record says heading, unit and meaning of every value that it and the records within it have."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from validation.columns import Column, column, columns_of, flat, values_of
+import numpy as np
+
+from validation.columns import Column, column, columns_of, flat, plain, values_of
 
 
 @dataclass(frozen=True)
@@ -34,3 +37,12 @@ def test_columns_and_values_have_the_same_keys():
     }
     assert values_of(Outer("x"))["inner"] is None
     assert flat({"a": {"b": {"c": 1}}, "d": 2}) == {"a.b.c": 1, "d": 2}
+
+
+def test_plain_makes_what_json_can_hold():
+    sample = Outer("x", np.int64(2), Inner(np.float32(0.5)))
+    written = plain({"sample": sample, 1: [np.bool_(True), None, (0.25,), float("nan"), np.float32("inf")]})
+    assert json.loads(json.dumps(written, allow_nan=False)) == {
+        "sample": {"name": "x", "count": 2, "inner": {"low": 0.5}, "others": {}},
+        "1": [True, None, [0.25], None, None],
+    }

@@ -44,8 +44,8 @@ def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
     own = []
     for which, numbers in groups.items():
         words = f"{which} {'is' if which.startswith('the') else 'are'} {{0:.4g}} times as bright as they should be"
-        own.append(factor_fault("light-factor", words, scaled(("airlight", "surface"), numbers)))
+        own.append(factor_fault("light-factor", words, scaled("intensity", numbers)))
         words = f"the fog of {which} is {{0:.4g}} times as bright as it should be"
-        own.append(factor_fault("fog-factor", words, scaled(("airlight",), numbers), ("both",)))
+        own.append(factor_fault("fog-factor", words, scaled("airlight", numbers), ("both",)))
     there = traits(predictor)
     return tuple(fault for fault in (*FAULTS, *own) if all(there[need] for need in fault.needs))

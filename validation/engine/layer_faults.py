@@ -13,7 +13,6 @@ from validation.engine.fault import (
     Fault,
     Parameter,
     Values,
-    changed_fog,
     changed_layers,
     of_fog_alone,
     of_surfaces_alone,
@@ -22,20 +21,18 @@ from validation.engine.fault import (
 from validation.engine.image_faults import SHIFT, best_corner, shifted
 from validation.engine.light_faults import PLACE, at_position, position_held
 from validation.engine.prediction import Guess, Layers, Predictor
-from validation.fog_model.radiance import Fog
 
 
-def scaled(layers: Sequence[str], lights: Sequence[int] | None = None) -> Change:
-    """Return what gives some lights, or all, a factor in layers, 'airlight' and 'surface'."""
+def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
+    """Return what gives some lights, or all, a factor in a tuple of the fog."""
 
-    def changed(fog: Fog, times: float) -> Fog:
-        given: dict[str, Any] = {}
-        for layer in layers:
-            old = getattr(fog, layer)
-            given[layer] = tuple(v * times if lights is None or n in lights else v for n, v in enumerate(old))
-        return replace(fog, **given)
+    def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
+        old = getattr(guess.fog, entry)
+        new = tuple(value * p[0] if lights is None or n in lights else value for n, value in enumerate(old))
+        given: dict[str, Any] = {entry: new}
+        return replace(guess, fog=replace(guess.fog, **given))
 
-    return changed_fog(changed)
+    return changed
 
 
 def _times(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
@@ -94,13 +91,13 @@ FOG_AND_SURFACES = (
     factor_fault(
         "fog-factor",
         "the fog is {0:.4g} times as bright as it should be, surfaces are right",
-        scaled(("airlight",)),
+        scaled("airlight"),
         ("both",),
     ),
     factor_fault(
         "surface-factor",
         "surfaces are {0:.4g} times as bright as they should be, the fog is right",
-        scaled(("surface",)),
+        scaled("surface"),
         ("both",),
     ),
     *(

@@ -51,7 +51,7 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
         return at_position(predictor, guess, p)
     held = at_position(predictor, guess, at)
     x, y, z = (value - before for value, before in zip(p, held.scenery.moved, strict=True))
-    return replace(held, fog=replace(held.fog, moved=((x, y, z), *held.fog.moved[1:])))
+    return replace(held, fog=held.fog.with_entry("moved", 0, (x, y, z)))
 
 
 PLACE = tuple(Parameter(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))

@@ -22,7 +22,6 @@ from validation.engine.fault import (
     short,
     with_law,
 )
-from validation.engine.layer_faults import scaled
 from validation.engine.prediction import Guess, Layers, Predictor
 from validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
 
@@ -85,8 +84,10 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
     Irradiance and radiance, of lights that are far or have extent, are what they were.
     """
-    dimmed = scaled(("airlight", "surface"), range(len(predictor.reference.lights)))(predictor, guess, (p[0] ** -2,))
-    return _optics(lambda sigma_t, albedo: (sigma_t * p[0], albedo))(predictor, dimmed, ())
+    near = len(predictor.reference.lights)
+    intensity = tuple(value / p[0] ** 2 if light < near else value for light, value in enumerate(guess.fog.intensity))
+    fog = changed_optics(guess.fog, lambda sigma_t, albedo: (sigma_t * p[0], albedo))
+    return replace(guess, fog=replace(fog, intensity=intensity))
 
 
 def _between(spherical: bool, end: str, at: float | None = None) -> Change:

@@ -44,6 +44,11 @@ class Scenery:
     radius: float = 0.0  #: of spheres in the place of point lights [m]
     blend: float = 0.0  #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
 
+    @property
+    def where(self) -> dict[str, Any]:
+        """What decides the rays."""
+        return {"offset": self.offset, "zoom": self.zoom}
+
     def lights(self, reference: ReferenceScene) -> tuple[ReferenceLight, ...]:
         """Return the point and spot lights of a scene as this scenery has them."""
         lights = []
@@ -57,6 +62,20 @@ class Scenery:
                 light = replace(light, beam=light.cutoff if self.edge == "hard" else 0.0)
             lights.append(light)
         return tuple(lights)
+
+    def model(self, seen: Seen, view: View, layer: int, ends: Ends | None) -> FogModel:
+        """Return the paths of a layer of an image, 0: airlight, 1: surfaces, with nodes between ends of a fog."""
+        return seen.model(
+            view,
+            self.lights(seen.reference),
+            ends=None if ends is None else view.ends(ends),
+            shadows=self.shadows,
+            radius=self.radius,
+            blend=self.blend,
+            airlight=layer == 0,
+            surface=layer == 1,
+            samples=max(_SPHERE_SAMPLES if self.radius else 0, seen.samples),
+        )
 
 
 @dataclass(frozen=True)
@@ -100,32 +119,16 @@ class SceneLight:
 
     def view(self, seen: Seen, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
-        offset, zoom = scenery.offset, scenery.zoom
+        key = "view", scenery.offset, scenery.zoom, _sight(seen)
         return self._once(
-            ("view", offset, zoom, _sight(seen)),
-            lambda: seen.view(most=seen.rays, apart=APART, offset=offset, zoom=zoom),
-            lambda view: 40 * view.distance.size,
+            key, lambda: seen.view(most=seen.rays, apart=APART, **scenery.where), lambda v: 40 * v.distance.size
         )
 
     def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
         """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces; `ends`: of a fog."""
-        view = self.view(seen, scenery)
-
-        def found() -> FogModel:
-            return seen.model(
-                view,
-                scenery.lights(seen.reference),
-                ends=None if ends is None else view.ends(ends),
-                shadows=scenery.shadows,
-                radius=scenery.radius,
-                blend=scenery.blend,
-                airlight=layer == 0,
-                surface=layer == 1,
-                samples=max(_SPHERE_SAMPLES if scenery.radius else 0, seen.samples),
-            )
-
         key = "model", scenery, layer, ends, _sight(seen)
-        return self._once(key, found, lambda model: 20 * model.places)
+        view = self.view(seen, scenery)
+        return self._once(key, lambda: scenery.model(seen, view, layer, ends), lambda model: 20 * model.places)
 
     def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
         """Return what a fog makes of a layer of the pixels, (m, 3) [W/(m^2 sr)]."""

@@ -210,7 +210,7 @@ def _of_light(kind: str, number: int, reference: ReferenceScene) -> Unknown:
     names = light_names(reference)
     name = kind + (f":{names[number]}" if len(names) > 1 else "")
     if kind == "intensity":
-        return Unknown(name, kind, (("airlight", number), ("surface", number)), 1.0)
+        return Unknown(name, kind, ((kind, number),), 1.0)
     if number >= len(reference.lights):
         raise InputError(f"fit: got '{name}', wanted the position of a point or spot light")
     axis = AXES.index(kind[-1])

@@ -42,7 +42,6 @@ from reference.visibility.planes import falloff, rays_at
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-Stretches = tuple[Index, Array, Array]  #: of rays: number of the ray, beginning and end [m], (n,) each
 
 AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
 
@@ -100,7 +99,11 @@ def point_nodes(
     by default.
     """
     rays = reach.rays
-    ray, x0, x1 = _between(lit_stretches(light, rays, reach.lit), ends)
+    ray, x0, x1 = lit_stretches(light, rays, reach.lit)
+    if ends is not None:
+        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
+    used = x1 > x0
+    ray, x0, x1 = ray[used], x0[used], x1[used]
     if not reference.media:
         x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(reference, light.position), x1)
         if isinstance(reference.medium, HeightMedium):
@@ -142,7 +145,11 @@ def parallel_nodes(
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
     rays = reach.rays
-    stretches = _between(sun_stretches(reference, reach), ends)
+    ray, x0, x1 = sun_stretches(reference, reach)
+    if ends is not None:
+        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
+    used = x1 > x0
+    stretches = ray[used], x0[used], x1[used]
     if isinstance(reference.medium, HeightMedium):
         pieces, depth = _before_sun(reference, light, stretches)
     else:
@@ -225,16 +232,7 @@ def lengths(reference: ReferenceScene, origin: Array, direction: Array, reach: A
     return np.stack([np.maximum(around, 0.0), *inside], axis=1)
 
 
-def _between(stretches: Stretches, ends: tuple[Array, Array] | None) -> Stretches:
-    """Return lit stretches between two distances along the rays, (rays,) each [m]."""
-    ray, x0, x1 = stretches
-    if ends is not None:
-        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
-    used = x1 > x0
-    return ray[used], x0[used], x1[used]
-
-
-def _by_height(reference: ReferenceScene, stretches: Stretches) -> Pieces:
+def _by_height(reference: ReferenceScene, stretches: tuple[Index, Array, Array]) -> Pieces:
     """Cut lit stretches where rays cross heights at which the density of height fog has kinks."""
     medium = reference.medium
     assert isinstance(medium, HeightMedium)
@@ -260,7 +258,9 @@ def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
     return np.asarray(np.abs(high - low) / least)
 
 
-def _before_sun(reference: ReferenceScene, light: DirectionalLight, stretches: Stretches) -> tuple[Pieces, Array]:
+def _before_sun(
+    reference: ReferenceScene, light: DirectionalLight, stretches: tuple[Index, Array, Array]
+) -> tuple[Pieces, Array]:
     """Return pieces of lit stretches in height fog, and how long each is in optical depths and in height."""
     medium = reference.medium
     assert isinstance(medium, HeightMedium)

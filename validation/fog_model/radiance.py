@@ -44,6 +44,7 @@ class Fog:
     sigma_t: tuple[Colour, ...]  #: extinction [1/m]; of height fog a factor on its density
     albedo: tuple[Colour, ...]  #: single-scattering albedo [1]
     phase: tuple[float | PhaseLaw | None, ...]  #: g of Henyey and Greenstein's function, or a law; None: the scene's
+    intensity: tuple[float, ...]  #: factors on the lights [1]
     airlight: tuple[float, ...]  #: factors on what the media scatter of each light [1]
     surface: tuple[float, ...]  #: factors on what surfaces reflect of each light [1]
     moved: tuple[Colour, ...]  #: how far the lights are from where the paths begin, x, y, z [m]
@@ -63,6 +64,12 @@ class Fog:
     height: HeightFog | None = None  #: how the density of the medium without bounds depends on height
     up: Colour = (0.0, 0.0, 1.0)  #: unit vector along which heights are
 
+    def with_entry(self, name: str, number: int, value: Any) -> "Fog":
+        """Return the fog with another entry of one of its tuples, such as the `sigma_t` of a medium."""
+        old = getattr(self, name)
+        entry: dict[str, Any] = {name: (*old[:number], value, *old[number + 1 :])}
+        return replace(self, **entry)
+
     @property
     def ends(self) -> Ends | None:
         """Between what along the rays it is; None where all of them are in it."""
@@ -74,12 +81,12 @@ class Fog:
     @property
     def without_factors(self) -> "Fog":
         """The fog without what multiplies the light of each source, see `combined`."""
-        one = (1.0,) * len(self.airlight)
-        return replace(self, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0))
+        one = (1.0,) * len(self.intensity)
+        return replace(self, intensity=one, airlight=one, surface=one, exposure=(1.0, 1.0, 1.0))
 
     def combined(self, by_light: Array) -> Array:
         """Return airlight and surfaces, (2, m, 3), from what `FogModel.by_light` returns."""
-        factors = np.array([self.airlight, self.surface])
+        factors = np.array([self.airlight, self.surface]) * np.array(self.intensity)
         return np.asarray(np.einsum("kl,klpc->kpc", factors, by_light) * np.array(self.exposure))
 
 
@@ -92,6 +99,7 @@ def scene_fog(reference: ReferenceScene) -> Fog:
         sigma_t=tuple(colour(each.sigma_t) for each in media) if height is None else ((1.0, 1.0, 1.0),),
         albedo=tuple(colour(medium.albedo) for medium in media),
         phase=tuple(medium.phase.g if medium.phase.name == "hg" else None for medium in media),
+        intensity=one,
         airlight=one,
         surface=one,
         moved=((0.0, 0.0, 0.0),) * len(one),
@@ -143,8 +151,9 @@ class FogModel:
     def transmittance(self, fog: Fog) -> Array:
         """Return the fraction of light that the rays leave of what is at their ends, (m, 3) [1]."""
         view = self.view
-        slant = 1 / (view.reference.direction @ view.axis)
-        length = _cut(view.length, fog, slant)
+        slant = 1.0 if fog.spherical else 1 / (view.reference.direction @ view.axis)
+        length = view.length.copy()
+        length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * slant) - fog.near * slant, 0.0)
         if fog.height is not None:
             origin, rise = view.reference.origin @ fog.up, view.reference.direction @ fog.up
             end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
@@ -192,7 +201,13 @@ class FogModel:
 
     def _camera_lengths(self, places: Places, fog: Fog, slant: Array) -> Array:
         flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
-        return _cut(places.camera / slant[:, None] if flat else places.camera, fog, slant)
+        camera = places.camera / slant[:, None] if flat else places.camera
+        if fog.near > 0 or np.isfinite(fog.far):
+            plane: Any = 1.0 if fog.spherical else slant
+            camera = camera.copy()
+            around = np.minimum(camera[:, AROUND], fog.far * plane) - fog.near * plane
+            camera[:, AROUND] = np.maximum(around, 0.0)
+        return camera
 
     def _by_height(
         self, places: Places, fog: Fog, number: int, camera: Array, light: Array, away: Array
@@ -225,14 +240,6 @@ class FogModel:
             own = (reference.medium, *reference.media)[medium].phase
             self._phases[key] = np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
         return self._phases[key]
-
-
-def _cut(length: Array, fog: Fog, slant: Array) -> Array:
-    """Return lengths from the camera in each medium, of that without bounds what lies between its ends, (n, media)."""
-    plane: Any = 1.0 if fog.spherical else slant
-    cut = length.copy()
-    cut[:, AROUND] = np.maximum(np.minimum(cut[:, AROUND], fog.far * plane) - fog.near * plane, 0.0)
-    return cut
 
 
 def _falls(r: Array, fog: Fog) -> Array:

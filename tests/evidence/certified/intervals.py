@@ -66,11 +66,7 @@ def dot(a: Vector, b: Vector) -> Number:
 
 def cross(a: Vector, b: Vector) -> Vector:
     """Return the vector product."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def unit(v: Vector) -> Vector:

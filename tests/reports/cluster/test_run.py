@@ -106,8 +106,7 @@ def test_twenty_kills_during_two_hundred_tasks(cluster):
 
     groups = [
         Group(
-            tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(10)),
-            Task(f"reference {g}", tasks.square, (g, 0.2)),
+            tuple(Task(f"{g}-{n}", tasks.add, (n,)) for n in range(10)), Task(f"reference {g}", tasks.square, (g, 0.2))
         )
         for g in range(20)
     ]

@@ -46,16 +46,6 @@ def test_the_margin_decides(files, capsys):
     assert run(["compare", *images]) == 0
 
 
-def test_everything_at_once(files, capsys):
-    images, mask = files
-    values = printed(capsys, *images, "--mask", mask, "--all-metrics")
-    assert (values["pixels"], values["masked"]) == (14 * 20, 2 * 20)
-    assert values["errors"]["values"] == 14 * 20 * 3
-    assert values["errors_normalised"]["unit"] != 1
-    # With a note where the package is missing, with a value where it is not.
-    assert (values["flip"]["value"] is None) == bool(values["flip"]["note"])
-
-
 @pytest.mark.claim("engine-margin", "scenes-stand-first")
 def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
     """The reference is found at the size of the file; upside down it is suspected, and the margin decides."""

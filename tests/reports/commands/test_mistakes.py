@@ -31,6 +31,8 @@ MISTAKES = (
     ("view sphere-spot --address 127.0.0.1:70000", "65535"),
     ("reference open-fog --estimator volpath --samples 128 --seconds 3", "samples and seconds exclude"),
     ("reference open-fog --estimator volpath --error 0", "error: got 0"),
+    ("reference open-fog --estimator volpath --error 1.5", "wanted less than 1"),
+    ("reference open-fog --estimator volpath --seed -1 --samples 64 --size 8x6", "seed: got -1"),
     ("reference open-fog --estimator volpath --pixel area", "volpath traces pixel centres"),
     ("reference open-fog --estimator volpath --seed 1048570 --samples 64 --size 8x6", "seed: got 1048570"),
     ("reference open-fog --samples 128", "samples: is for single-scatter"),

@@ -3,10 +3,10 @@
 
 import numpy as np
 import pytest
-from PIL import Image as Picture
 
 from reference.storage.exr import Image, write_exr
 from reports.commands.main import run
+from tests.helpers.api import brighter
 from tests.helpers.reports import checked, report_of
 
 METHOD = """
@@ -139,6 +139,15 @@ def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, hande
     assert capsys.readouterr().err == ""
 
 
+def test_from_python_a_function_runs_in_this_process(variant, tmp_path, handed_on):
+    import airlight
+
+    report = airlight.report("open-fog", method=["min-max", brighter], output=tmp_path / "out")
+    assert (report.folder, report.claims) == (tmp_path / "out", ("`--full` has all.",))
+    assert [each[0].rpartition(":")[2] for each in _measured(handed_on)] == ["min-max", "brighter"]
+    assert not handed_on["apart"]
+
+
 @pytest.fixture
 def images(tmp_path):
     folder = tmp_path / "engine"
@@ -163,13 +172,9 @@ def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     import json
 
     from reports.data.reader import named_files, report_text
-    from tests.helpers.page import report_data, small_report, write_files
+    from tests.helpers.page import report_data, small_report, write_report_files
 
-    folder = write_files(tmp_path / "r")
-    for name in named_files(small_report()):
-        if not (folder / name).exists():
-            Picture.new("RGB", (6, 4)).save(folder / name, "PNG")
-    (folder / "report.json").write_text(json.dumps(report_data()), encoding="utf-8")
+    folder = write_report_files(tmp_path / "r")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "again"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(report_text(small_report()))
     assert "The reference is confirmed." in (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
@@ -177,34 +182,3 @@ def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     (folder / next(name for name in named_files(small_report()) if name.endswith(".png"))).write_bytes(b"half a file")
     assert run(["report", "--from", str(folder), "-o", str(tmp_path / "third")]) == 2
     assert "is no picture that can be read" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_images_and_ones_own_method_in_one_report(variant, mine, images, capsys):
-    import json
-
-    from validation.estimates.quadrature import reference_image
-    from validation.scenes.loading import load_scene
-
-    reference = reference_image(load_scene("open-fog", (32, 24)).scene)
-    for name, factor in (("a", 1.0), ("b", 0.9)):
-        write_exr(images / f"open-fog.{name}.exr", Image({"airlight": factor * reference.airlight}))
-    area = reference_image(load_scene("open-fog", (32, 24)).scene, pixel="area")
-    write_exr(images / "open-fog.means.exr", Image({"total": area.airlight}))
-    options = ["open-fog", "--method", "unshadowed", "--method", "fog_of_mine:half", "-o", "out"]
-    assert run(["report", "--quick", "--images", str(images), *options]) == 0
-    (scene,) = json.loads((mine / "out" / "report.json").read_text())["scenes"]
-    assert scene["size"] == scene["timed"] == [32, 24]
-    entries = {entry["label"]: entry for entry in scene["methods"]}
-    assert entries["fog_of_mine:half (exact)"]["kind"] == "function"
-    assert entries["fog_of_mine:half (exact)"]["error"]["relative_bias"] == pytest.approx(-0.5, abs=1e-5)
-    assert entries["a"]["kind"] == entries["b"]["kind"] == "image"
-    assert entries["a"]["times"] is None
-    # float32 in the file
-    assert entries["a"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
-    assert entries["b"]["error"]["relative_bias"] == pytest.approx(-0.1, abs=1e-6)
-    assert entries["a"]["pixel"] == "centre"
-    assert (entries["means"]["pixel"], entries["means"]["layer"]) == ("area", "total")
-    assert entries["means"]["error"]["relative_rmse"] == pytest.approx(0, abs=1e-7)
-    assert "means over the areas of pixels" in entries["means"]["note"]
-    assert "The image b of open-fog, judged by its airlight" in capsys.readouterr().out

@@ -49,17 +49,3 @@ def test_a_driver_is_judged_when_it_is_first_met_and_a_wrong_one_is_refused(vari
     (next(iter(own_cache.glob("shader-driver*")))).unlink()
     monkeypatch.setattr(driver_check, "driver_error", lambda host: (4e-5, 848))
     assert "errs by 4.0e-05 at most on certified integrals, more than 3e-05" in opengl_status().reason
-
-
-@pytest.mark.slow
-def test_a_fault_is_a_row_of_a_study_with_the_rows_of_others(variant, tmp_path, capfd):
-    need_opengl()
-    shader = tmp_path / "fog.glsl"
-    shader.write_text("vec3 airlight(Ray ray) {\n    return vec3(x);\n}\n")
-    output = tmp_path / "study.json"
-    asked = ["study", "methods", "omni-box", "--size", "16x12", "--seconds", "0.01", "-o", str(output)]
-    assert cli.run([*asked, "--method", str(shader), "--method", MARCHER]) == 1
-    rows = {row["method"]: row for row in json.loads(output.read_text())["scenes"][0]["methods"]}
-    assert "line 2: `x' undeclared" in rows[str(shader)]["refused"]
-    assert rows[MARCHER]["error"]["relative_rmse"] < 0.02
-    assert rows[MARCHER]["device"]

@@ -65,12 +65,6 @@ def report(tmp_path_factory):
     return folder
 
 
-def test_the_chart_has_what_has_times(report):
-    data, _ = load_report(report)
-    labels = [entry.label for scene in data.scenes for entry in figures._timed(scene)]
-    assert labels == list(_WRONG)  # neither the refused one nor the one without times
-
-
 @pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
 def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(report, tmp_path):
     """In another process, by the command; and what is embedded are TrueType fonts, no date."""

@@ -23,12 +23,7 @@ def test_each_file_has_its_outcome(variant, tmp_path):
     log = describe_folder(tmp_path)
     found = {each.file: each for each in log.of}
     outcomes = {name: each.outcome for name, each in found.items()}
-    assert outcomes == {
-        "good.xml": "taken",
-        "old/mist.xml": "taken",
-        "projector.xml": "refused",
-        "torn.xml": "refused",
-    }
+    assert outcomes == {"good.xml": "taken", "old/mist.xml": "taken", "projector.xml": "refused", "torn.xml": "refused"}
     assert found["good.xml"].words == ""
     assert "sigma_t 0.4 and albedo 0.75" in found["old/mist.xml"].words
     assert "projector" in found["projector.xml"].words

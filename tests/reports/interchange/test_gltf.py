@@ -157,10 +157,7 @@ def test_shapes_become_meshes_that_lie_on_them(variant, kind, mirrored, flipped)
 
 
 @pytest.mark.claim("gltf-area-lights", tolerance="1e-6: float32")
-@pytest.mark.parametrize(
-    ("kind", "flipped"),
-    [("rectangle", True), ("sphere", False)],
-)
+@pytest.mark.parametrize(("kind", "flipped"), [("rectangle", True), ("sphere", False)])
 def test_a_light_with_extent_is_a_mesh_that_emits_from_the_side_of_its_normal(variant, tmp_path, kind, flipped):
     """Rationale: core glTF has no such light; faces run counter-clockwise seen from where it shines."""
     scale = {"rectangle": [0.5, 0.3, 1.0], "sphere": [0.3] * 3}[kind]

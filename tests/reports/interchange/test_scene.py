@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""What `describe` says of a scene: for engines in general, for Cycles, and its fog as a grid."""
+
 import json
 import math
 
@@ -6,10 +8,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import airlight
+from reference.quadrature.height_fog import fog_of
+from reference.scene.read import read_reference
 from reports.commands.main import run
+from reports.interchange.fog_grid import fog_grid, write_fog_grid
 from reports.interchange.scene import describe_scene, spot_power_angle
 from tests.helpers.area_lights import lamp
-from tests.helpers.scenes import bounded_medium, tiny_scene
+from tests.helpers.height_fog import LAMP, fog_xml
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import FOG_SCENES
 
@@ -126,3 +133,90 @@ def test_command_prints_json_and_writes_gltf(capsys, tmp_path):
 def test_every_built_in_scene_can_be_described_and_written(name, variant, tmp_path, capsys):
     assert run(["describe", name, "-o", str(tmp_path / "scene.glb")]) == 0
     assert "sigma_t" in capsys.readouterr().out
+
+
+def properties(**changes):
+    described = describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
+    return described, described["properties"]["Cycles"]
+
+
+def test_a_camera_looks_along_minus_z_and_cuts_no_fog_away(variant):
+    described, cycles = properties()
+    camera = described["camera"]
+    matrix = np.array(cycles["camera"]["matrix_world"])
+    np.testing.assert_allclose(matrix[:3, 2], -np.array(camera["forward"]), atol=1e-12)
+    np.testing.assert_allclose(matrix[:3, 3], camera["position"], atol=1e-12)
+    # A rotation, float32's digits.
+    np.testing.assert_allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-6)
+    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1.0, abs=1e-6)
+    data = cycles["camera"]["data"]
+    assert (data["sensor_fit"], math.degrees(data["angle"])) == ("HORIZONTAL", pytest.approx(camera["fov_horizontal"]))
+    assert data["clip_start"] < 1e-5
+
+
+def test_lights_have_watts_whole_angles_and_directions(variant):
+    described, cycles = properties(hard=spot())
+    lamp, hard = cycles["lights"]
+    assert lamp["type"] == "POINT"
+    np.testing.assert_allclose(
+        np.array(lamp["data"]["color"]) * lamp["data"]["energy"], described["lights"][0]["power_all_round"], rtol=1e-12
+    )
+    assert (lamp["data"]["shadow_soft_size"], lamp["data"]["use_soft_falloff"]) == (0.0, False)
+    assert math.degrees(hard["data"]["spot_size"]) == pytest.approx(2 * described["lights"][1]["cutoff_angle"])
+    assert hard["data"]["spot_blend"] == 0.0
+    matrix = np.array(hard["matrix_world"])
+    np.testing.assert_allclose(-matrix[:3, 2], described["lights"][1]["axis"], atol=1e-12)
+    np.testing.assert_allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-6)
+
+
+def test_media_have_coefficients_and_the_sign_of_g(variant):
+    fog = tiny_scene()["fog"] | {"phase": {"type": "hg", "g": -0.37}}
+    described, cycles = properties(fog=fog)
+    assert cycles["world"]["phase"] == "HENYEY_GREENSTEIN"
+    assert cycles["world"]["inputs"] == {
+        "Scatter Coefficients": described["medium"]["sigma_s"],
+        "Absorption Coefficients": described["medium"]["sigma_a"],
+        "Anisotropy": -0.37,
+    }
+    three = describe_scene(load_scene("three-media", (8, 6)))["properties"]["Cycles"]
+    assert three["world"] is None
+    assert len(three["media"]) == 3
+
+
+@pytest.fixture
+def medium(variant, tmp_path):
+    path = tmp_path / "fog.xml"
+    path.write_text(fog_xml(LAMP))
+    return read_reference(load_scene(str(path)).scene).medium
+
+
+@pytest.mark.claim("height-fog-grid", tolerance="1e-12 relative between nodes, u^2/8 of the whole")
+def test_optical_depths_between_nodes_are_exact(medium):
+    density, fog = fog_grid(medium), fog_of(medium)
+    step = (medium.cap - medium.floor) / len(density)
+    z = medium.floor + step * (np.arange(len(density)) + 0.5)
+    cells = 0.5 * (density[1:] + density[:-1]) * step
+    np.testing.assert_allclose(cells, fog.optical_depth(z[:-1], z[1:], step), rtol=1e-12)
+    # The lowest half voxel is constant: it lacks u^2/8 of sigma H, u = 1/20.
+    assert density.sum() * step == pytest.approx(float(fog.column(medium.floor)), rel=1 / 20**2 / 8)
+
+
+def test_mitsuba_reads_the_file(medium, tmp_path):
+    text = write_fog_grid(tmp_path / "fog.vol", medium)
+    read = mi.load_string(text.replace("<medium ", '<medium version="3.0.0" ', 1))
+    z = np.linspace(medium.floor + 1, medium.cap - 1, 57)
+    interaction = mi.MediumInteraction3f()
+    interaction.p = mi.Point3f(np.stack([31 - z, 3 * z, z]).astype(np.float32))
+    found = np.array(read.get_scattering_coefficients(interaction)[2])[0]
+    np.testing.assert_allclose(found, fog_of(medium).density(z), rtol=5e-4)
+
+
+def test_describe_writes_it(variant, tmp_path):
+    (tmp_path / "fog.xml").write_text(fog_xml(LAMP))
+    found = airlight.describe(str(tmp_path / "fog.xml"), output=tmp_path / "fog.vol")
+    assert (tmp_path / "fog.vol").exists()
+    assert "gridvolume" in found.grid
+    airlight.describe("smoke", output=tmp_path / "smoke.vol")
+    assert mi.VolumeGrid(str(tmp_path / "smoke.vol")).max() == pytest.approx(4.7)
+    with pytest.raises(airlight.InputError, match="the medium is no height fog and no grid"):
+        airlight.describe("open-fog", output=tmp_path / "open.vol")

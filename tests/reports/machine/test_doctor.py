@@ -43,10 +43,7 @@ def test_a_missing_library_is_shown_with_what_to_do(monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("code", "words"),
-    [
-        ("import os; os.abort()", "killed by SIGABRT"),
-        ("import time; time.sleep(30)", "did not end within"),
-    ],
+    [("import os; os.abort()", "killed by SIGABRT"), ("import time; time.sleep(30)", "did not end within")],
 )
 def test_a_kernel_that_crashes_is_shown_and_crashes_nothing(code, words, monkeypatch):
     real = doctor.subprocess.run

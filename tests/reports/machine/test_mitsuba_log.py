@@ -29,26 +29,21 @@ end_header
     [
         ["describe"],
         ["render", "--method", "unshadowed", "-o", "frame.exr"],
-        ["reference", "-o", "reference.exr"],
         ["reference", "-o", "sampled.exr", "--estimator", "single-scatter", "--samples", "64"],
-        ["compare", "reference.exr"],
     ],
-    ids=lambda order: "-".join(order[:1] + order[-1:]),
+    ids=lambda order: order[0],
 )
 def test_json_is_all_that_is_printed(variant, tmp_path, monkeypatch, capfd, order):
     """The mesh is ASCII and long enough that Mitsuba warns of it; it has an isolated vertex and an empty triangle."""
     from reports.commands.main import run
 
     monkeypatch.chdir(tmp_path)
-    name = f"{order[0]}-{len(order)}"  # each message is said once a process
+    name = order[0]  # each message is said once a process
     vertices = [f"{number * 1e-4:.12f} {number % 7 * 1e-3:.12f} 0.400000000001\n" for number in range(3000)]
     (tmp_path / f"{name}.ply").write_text(HEAD.format(3000) + "".join(vertices) + "3 0 1 2\n3 0 0 1\n")
     (tmp_path / "own.xml").write_text(SCENE.format(name))
-    if order[0] == "compare":
-        assert run(["reference", "own.xml", "-o", "reference.exr"]) == 0
-        capfd.readouterr()
     status = run([order[0], "own.xml", *order[1:], "--json"])
     printed = capfd.readouterr()
     assert status == 0, printed.err
     assert json.loads(printed.out)
-    assert printed.err.count("uses the ASCII PLY format") == (0 if order[0] == "compare" else 1)
+    assert printed.err.count("uses the ASCII PLY format") == 1

@@ -28,10 +28,7 @@ def test_what_is_returned_comes_back_and_what_is_printed_goes_to_the_error_strea
 
 @pytest.mark.parametrize(
     ("function", "arguments", "words"),
-    [
-        (os.abort, (), "killed by SIGABRT"),
-        (sys.exit, (0,), "exit status 0"),
-    ],
+    [(os.abort, (), "killed by SIGABRT"), (sys.exit, (0,), "exit status 0")],
     ids=lambda value: getattr(value, "__name__", None),
 )
 def test_a_process_that_ends_says_how(variant, function, arguments, words):

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: Ctrl-C and SIGTERM end a command at any moment, with 130 and 143 for the shell, and say nothing.
+"""Claim: signals end a command at once with the shell's status; output that is closed, full or ASCII is no fault.
 
 Each program says when it is where the signal shall meet it: no test hangs on the clock.
 """
 
+import json
 import os
 import signal
 import subprocess
@@ -82,3 +83,43 @@ def test_what_the_parent_ignores_stays_ignored(shell):
     """As by nohup, and as a shell does it for programs in the background."""
     process, _ = shell(f"{READY}import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nprint('done')")
     assert process.stdout.read() == "done\n0\n"
+
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def run(line, **environment):
+    """Run a line of the shell in which $AIRLIGHT is the command."""
+    environment = os.environ | {"AIRLIGHT": f"{sys.executable} {ROOT / 'airlight.py'}"} | environment
+    return subprocess.run(["sh", "-c", line], capture_output=True, env=environment, timeout=120)
+
+
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [
+        ("$AIRLIGHT list nowhere <&- >&- 2>&-", 2),
+        ("($AIRLIGHT list kernels; echo $? >&2) | head -c 1 >/dev/null", 0),
+        ("$AIRLIGHT list kernels >/dev/full", 2),
+    ],
+)
+def test_closed_and_full_streams_are_no_fault(line, status):
+    ran = run(line)
+    assert ran.returncode == status
+    assert b"Traceback" not in ran.stderr
+
+
+def test_a_file_does_not_take_the_place_of_a_closed_output(tmp_path):
+    code = "from reports.machine.process_start import usable_streams; usable_streams()\n"
+    code += f"file = open({str(tmp_path / 'a')!r}, 'w'); print('printed'); import os; os.write(1, b'said')"
+    assert run(f'cd {ROOT}; {sys.executable} -c "{code}" >&-').returncode == 0
+    assert (tmp_path / "a").read_bytes() == b""
+
+
+def test_json_loses_nothing_in_ascii():
+    code = "from reports.machine.process_start import usable_streams; usable_streams()\n"
+    code += "print('\\u2500')\n"
+    code += "from reports.tables.terminal import print_json; print_json({'name': '\\u2500 \\udcff'})"
+    ran = run(f'cd {ROOT}; {sys.executable} -c "{code}"', PYTHONIOENCODING="ascii")
+    shown, _, printed = ran.stdout.partition(b"\n")
+    assert shown == b"?"
+    assert json.loads(printed) == {"name": "\u2500 \udcff"}

@@ -4,10 +4,8 @@ import copy
 import pytest
 
 from reports.report import claims as made
-from reports.tables.agreement import verdict
-from tests.helpers.reports import agreement, checked, entry, record_of, report_of, scene
+from tests.helpers.reports import agreement, checked, entry, report_of, scene
 from tests.helpers.reports import refused as refused_entry
-from validation.statistics.records import Agreement
 
 
 def method(label, rmse, median, *, refused=None):
@@ -86,15 +84,6 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_reference():
     assert not confirmed(data)
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
     assert confirmed(data)
-
-
-def test_out_of_time_can_still_speak_against_the_reference():
-    data = scenes()
-    data[1]["agreement"]["airlight"] = out_of_time([0.006, 0.03])
-    assert verdict(record_of(data[1]["agreement"]["airlight"], Agreement)) is False
-    assert "NOT confirmed by" in claims(data)[0].text
-    data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
-    assert not confirmed(data)
 
 
 def test_what_failed_is_named_with_its_pixels():

@@ -1,41 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""A report holds what its study asks for, in whole files; kept parts are found again, and efforts add parts."""
+
 import json
-import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import wraps
 from types import SimpleNamespace
 
-import mitsuba as mi
+import numpy as np
 import pytest
 
 from analytic.errors import InputError
 from reports.data.reader import named_files, read_report, report_text
-from reports.report.measure import write_report
-from reports.report.scene import file_stems, folder_of
-from validation.scenes.random.design import random_name
+from reports.report.measure import staged, write_report
+from reports.report.others import other_parts
+from reports.report.scene import file_stems, folder_of, reference_record
+from tests.helpers.scenes import LAMP, scene_xml
 from validation.study.configuration import Configuration
-from validation.study.study import Checks, Measure, Study
+from validation.study.study import STUDIES, Checks, Measure, Study, standard_study
 
-SCENE = """<scene version="3.0.0">
-    <medium type="homogeneous" id="fog">
-        <float name="sigma_t" value="0.31"/>
-        <rgb name="albedo" value="0.9, 0.8, 0.7"/>
-        <phase type="tabphase"><string name="values" value="0.3, 0.2, 0.4, 0.9, 2.0"/></phase>
-    </medium>
-    <emitter type="point">
-        <point name="position" value="0.9, 0.7, 1.9"/>
-        <rgb name="intensity" value="5, 4, 3"/>
-    </emitter>
-    <sensor type="perspective">
-        <float name="fov" value="41.7"/>
-        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
-        <ref name="medium" id="fog"/>
-        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/></film>
-    </sensor>
-    <shape type="sphere"><point name="center" value="0.1, 0.1, 0.7"/><float name="radius" value="0.41"/></shape>
-    <shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>
-</scene>
-"""
+FLOOR = '<shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>'
+FOG = '<float name="sigma_t" value="0.31"/><rgb name="albedo" value="0.9, 0.8, 0.7"/>'
+FOG += '<phase type="tabphase"><string name="values" value="0.3, 0.2, 0.4, 0.9, 2.0"/></phase>'
+SCENE = scene_xml(LAMP, FLOOR, fog=FOG, size=(16, 12))
 MARCH = Configuration("ray-march", None, (("steps", 50),))
 CHOSEN = (Configuration("unshadowed", "taylor"), Configuration("unshadowed", "quadrature"), MARCH)
 # Numbers of samples and no times: what two runs find must not hang on how busy the machine is.
@@ -199,26 +185,12 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
     assert measured["scenes"][0]["reference"]["mean"] != written.data["scenes"][0]["reference"]["mean"]
 
 
-def test_a_random_scene_with_meshes_on_any_path_has_a_safe_folder(written, variant, tmp_path, monkeypatch, own_cache):
-    multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("validation.study.scene.agreements", lambda scene, margins, **options: {})
-    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
-    folder = tmp_path / "C:my, 5% meshes"
-    folder.mkdir()
-    mi.load_dict({"type": "cube"}).write_ply(str(folder / "a.ply"))
-    (folder / "ranges.toml").write_text('meshes = "."')
-    name = random_name(1, folder / "ranges.toml")
-    data = again(written, tmp_path, scenes=(name,), configurations=CHOSEN[1:2])
-    assert data["scenes"][0]["name"] == name
-    files = list(named_files(read_report(tmp_path / "again")))
-    assert all(re.fullmatch(r"random-1/[a-z-]+(\.exr|\.png)", file) for file in files)
-    assert all((tmp_path / "again" / file).exists() for file in files)
-    assert [folder_of(each) for each in ("hall", "a/my <fog> #2.xml", "a/..xml", "random:7")] == [
-        "hall",
-        "my-fog-2",
-        "scene",
-        "random-7",
-    ]
+@pytest.mark.parametrize(
+    ("scene", "folder"),
+    [("hall", "hall"), ("a/my <fog> #2.xml", "my-fog-2"), ("a/..xml", "scene"), ("random:7", "random-7")],
+)
+def test_a_scene_of_any_name_has_a_safe_folder(scene, folder):
+    assert folder_of(scene) == folder
 
 
 def test_scenes_of_one_name_are_refused_before_the_work(variant, tmp_path):
@@ -249,3 +221,56 @@ def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
     assert "growth" in {claim.kind for claim in data.claims}
     assert data.parts["scaling"] > 0
     assert "As the work grows" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def content(folder):
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_files_appear_when_the_block_ends(tmp_path):
+    (tmp_path / "report.html").write_text("old")
+    (tmp_path / "mine.txt").write_text("mine")
+    with staged(tmp_path) as hidden:
+        (hidden / "fog").mkdir()
+        (hidden / "fog" / "a.exr").write_text("image")
+        (hidden / "report.html").write_text("new")
+        assert (tmp_path / "report.html").read_text() == "old"
+    assert content(tmp_path) == {"report.html": "new", "mine.txt": "mine", "fog/a.exr": "image"}
+    assert hidden.exists() is False
+
+
+@pytest.mark.claim("files-whole-or-not-at-all")
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, ValueError])
+def test_an_exception_leaves_everything_as_it_was(tmp_path, stop):
+    (tmp_path / "report.html").write_text("old")
+
+    def work():
+        with staged(tmp_path) as hidden:
+            (hidden / "report.html").write_text("half")
+            raise stop
+
+    with pytest.raises(stop):
+        work()
+    assert content(tmp_path) == {"report.html": "old"}
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+@pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
+def test_reference_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
+    from reference.quadrature.ray_values import ReferenceImage
+
+    black = np.zeros_like(airlight)
+    found = reference_record(ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))
+    json.dumps(asdict(found), allow_nan=False)
+    assert found.relative_bound is None
+    assert found.missed is None
+
+
+def test_a_larger_effort_measures_more_verdicts_and_part_of_its_scenes_none(own_cache):
+    def papers(study):
+        return [part.title for part in other_parts(study) if part.kind == "papers"]
+
+    quick, default, full = (standard_study(name) for name in STUDIES)
+    assert papers(quick) == ["formulas", "stencil"]  # no image
+    assert set(papers(quick)) < set(papers(default)) < set(papers(full))
+    assert papers(replace(default, scenes=("open-fog",))) == papers(replace(quick, name="mine")) == []

@@ -7,13 +7,14 @@ from itertools import islice
 
 import pytest
 
+from reports.commands.main import run
 from reports.page.chart import svg_text
 from reports.sweep.figures import drawn
 from reports.sweep.page import render_sweep, write_sweep
 from reports.sweep.read import FILE, read_sweep
 from reports.sweep.summary import summary_of, to_json
 from tests.helpers.page import Page
-from tests.helpers.sweeps import faulty_rows, row, write_rows
+from tests.helpers.sweeps import METHODS, faulty_rows, row, rows, write_rows
 
 
 def said_of(folder, several):
@@ -33,14 +34,6 @@ def charts(said):
 @pytest.fixture(scope="module")
 def page(said, charts):
     return Page(render_sweep(said, charts))
-
-
-def test_page_says_what_was_planted(page):
-    text = " ".join(page.text.split())
-    assert "How fast and how accurate in 41 random scenes" in text
-    for words in ("optical depth", "wanted at most N", "1 of 194 images", "of 201 cells"):
-        assert words in text
-    assert "airlight compare random:1 --method ray-march" in text
 
 
 @pytest.mark.claim("sweep-page-stands-alone")
@@ -107,3 +100,15 @@ def test_all_is_written_from_the_parquet(tmp_path):
     figures = {f"figures/{name}.{suffix}" for name in ("sweep-errors", "sweep-medians") for suffix in ("pdf", "svg")}
     assert written == {"sweep.html", "sweep.json", *figures}
     assert [path.name for path in source.iterdir()] == [FILE]
+
+
+def test_the_command_writes_beside_the_rows_and_prints_what_it_writes(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("reports.sweep.page.drawn_figures", lambda said: iter(()))  # they take long
+    write_rows(tmp_path / FILE, rows(30))
+    assert run(["sweep", "--from", str(tmp_path)]) == 0
+    assert METHODS[0][0] in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {FILE, "sweep.html", "sweep.json"}
+    assert run(["sweep", "--from", str(tmp_path / FILE), "--json", "-o", str(tmp_path / "said")]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert len(data["claims"]) == 3 * len(METHODS)
+    assert data == json.loads((tmp_path / "said" / "sweep.json").read_text())

@@ -7,15 +7,7 @@ from dataclasses import replace
 import pytest
 
 from reports.tables.drawing import csv, html, latex, markdown, text
-from reports.tables.table import (
-    Column,
-    Measured,
-    Row,
-    Table,
-    numbers,
-    with_spread,
-    words,
-)
+from reports.tables.table import Column, Measured, Row, Table, numbers, with_spread, words
 
 
 @pytest.mark.claim("latex-tables")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every time stands under its own heading, however the table is drawn, and what is not finite never wins."""
+"""Times stand under their own headings, what is not finite never wins; what tables decide of references and growth."""
 
 import re
 from dataclasses import replace
@@ -7,10 +7,14 @@ from dataclasses import replace
 import pytest
 
 from reports.data.records import MethodRow, Scene
+from reports.tables.agreement import verdict
 from reports.tables.drawing import csv, html, latex, markdown, text
 from reports.tables.methods import COLUMNS, TIMES, fastest_table, methods_table
+from reports.tables.scaling import cliffs, scaling_tables
+from tests.helpers.reports import agreement, errors, growth_record, record_of, scene
 from tests.helpers.reports import entry as made
-from tests.helpers.reports import errors, record_of, scene
+from validation.statistics.records import Agreement
+from validation.timing import Scaling
 
 MEDIANS = {name: 2.0 + place for place, name in enumerate(TIMES)}  # no two alike
 
@@ -78,3 +82,26 @@ def test_the_fastest_method_within_each_error_has_a_cell():
 )
 def test_what_has_no_finite_error_or_no_time_is_never_the_fastest(never):
     assert fastest_of(never, entry("best", rmse=0.0009)) == ("fog", *["best: 2 ms, 500 frames/s"] * 2)
+
+
+@pytest.mark.parametrize(
+    ("equivalent", "interval", "finished", "good"),
+    [
+        (True, [-0.001, 0.003], True, True),
+        (False, [-0.001, 0.03], True, False),
+        (False, [-0.001, 0.03], False, None),  # not decided in time
+        (False, [0.006, 0.03], False, False),  # outside as a whole
+        (False, [None, None], False, False),
+    ],
+)
+def test_a_reference_is_confirmed_refused_or_not_decided(equivalent, interval, finished, good):
+    compared = agreement(equivalent, margin=0.005, finished=finished, relative_bias_ci=interval)
+    assert verdict(record_of(compared, Agreement)) is good
+
+
+def test_jumps_are_found():
+    calm, jump = (record_of(growth_record(cliff=cliff), Scaling) for cliff in (False, True))
+    assert len(cliffs([jump, calm])) == 1
+    costs, exponents = scaling_tables([record_of(growth_record(works=(), refused="method x: no"), Scaling)])
+    assert costs.rows[0].reason == "refused: method x: no"
+    assert exponents.rows == ()

@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reports.view.live_scene import LiveScene
@@ -103,15 +102,3 @@ def test_a_parameter_records_the_methods_stages_and_not_the_surface():
     shown(scene)
     assert scene.renderer is first
     assert recordings(scene) == before
-
-
-def test_a_change_that_cannot_be_leaves_all_as_it_was():
-    scene = live()
-    scene.change(LIGHT)
-    before = shown(scene)
-    for change in ({"medium.sigma_t": (-1.0,)}, {"camera.fov": (0.0,)}, {"lamp.position": (1.0,)}):
-        with pytest.raises(InputError):
-            scene.change(change)
-    assert scene.changes == LIGHT
-    for layer, same in zip(shown(scene), before, strict=True):
-        np.testing.assert_array_equal(layer, same)

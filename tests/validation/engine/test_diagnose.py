@@ -5,6 +5,7 @@ import importlib
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,11 +15,14 @@ from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from reference.storage.exr import Image
 from tests.helpers.planted_faults import PLANTED
+from tests.helpers.scenes import FOG, scene_xml
 from validation.engine.diagnose import diagnose_image
 from validation.engine.evidence import is_noise
+from validation.engine.fault import Fault
 from validation.engine.judged_layer import judged_layer
+from validation.engine.light_faults import PLACE
 from validation.engine.prediction import Guess, SceneLight
-from validation.engine.search import Explanation
+from validation.engine.search import Explanation, _Search
 from validation.engine.seen import seen_image
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import scattering_paths, view_of
@@ -82,14 +86,7 @@ def test_a_light_that_is_off_is_named_among_many_triangles(reference, monkeypatc
 @pytest.mark.slow
 def test_a_light_with_a_radius_is_named(variant, tmp_path):
     path = tmp_path / "fog.xml"
-    path.write_text(
-        """<scene version="3.0.0"><medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/>
-        <float name="albedo" value="0.83"/><phase type="hg"><float name="g" value="0.47"/></phase></medium>
-        <emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>
-        <sensor type="perspective"><transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6"
-        up="0, 0, 1"/></transform><ref name="medium" id="fog"/></sensor>
-        <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape></scene>"""
-    )
+    path.write_text(scene_xml(fog=FOG + '<phase type="hg"><float name="g" value="0.47"/></phase>'))
     own = read_reference(load_scene(str(path), SIZE).scene)
     view = view_of(own)
     model = FogModel(view, scattering_paths(view, radius=0.25, samples=64))
@@ -194,3 +191,17 @@ def test_values_that_few_pixels_have_cut_off_are_looked_at(variant):
     assert np.isin(pixels, seen.cut_off).sum() >= 4
     assert np.isin(added, seen.cut_off).all()
     assert len(added) <= 5  # 355 of 19 200 pixels are looked at, 1.25 % of which are cut off
+
+
+def test_a_place_is_found_where_pixels_are_lit_or_dark():
+    """Each pixel is wrong by all of its light while the light is further from its place than the shadow is wide."""
+    true, widths = np.array([0.05, -0.07, 0.05]), np.linspace(0.004, 0.3, 100)
+
+    def errors(place):
+        return np.repeat((widths < np.linalg.norm(np.array(place) - true))[:, None], 3, axis=1).astype(float)
+
+    place_of = Fault("place", "", lambda predictor, guess, p: p, PLACE)
+    search = _Search(SimpleNamespace(fog=None, errors=errors), (place_of,))
+    begun = np.zeros(3)
+    np.testing.assert_array_equal(search.by_steps(begun, 0.01, False), begun)
+    np.testing.assert_allclose(search.along_axes(begun, 0.01), true, atol=0.01)

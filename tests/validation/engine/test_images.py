@@ -10,15 +10,7 @@ import pytest
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from validation.engine.hints import find_hints
-from validation.engine.images import (
-    TIMES,
-    EngineImage,
-    find_images,
-    image_times,
-    images_size,
-    measure_image,
-    notes_of,
-)
+from validation.engine.images import TIMES, EngineImage, find_images, image_times, images_size, measure_image, notes_of
 from validation.scenes.loading import load_scene
 from validation.timing import Timing
 

@@ -9,27 +9,16 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr, write_exr
+from tests.helpers.scenes import scene_xml
 from validation.comparison.images import compare_images
 from validation.engine.error_place import error_place
 from validation.engine.hints import find_hints
 from validation.engine.images import EngineImage, measure_image
 from validation.engine.judge import compare_scene, judge, references
 from validation.engine.judged_layer import expected_layer, judged_layer
-from validation.engine.seen import scene_of_size, seen_image
+from validation.engine.seen import seen_image
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer
 from validation.scenes.loading import load_scene
-
-SCENE = """<scene version="3.0.0">
-    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/><float name="albedo" value="0.83"/></medium>
-    <emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>
-    <sensor type="perspective">
-        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
-        <ref name="medium" id="fog"/>
-        <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film>
-    </sensor>
-    <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape>
-</scene>
-"""
 
 
 def refused(text):
@@ -39,7 +28,7 @@ def refused(text):
 @pytest.fixture
 def scene(tmp_path):
     path = tmp_path / "own.xml"
-    path.write_text(SCENE)
+    path.write_text(scene_xml())
     return str(path)
 
 
@@ -98,19 +87,16 @@ def test_margin_decides_without_standard_errors(scene, expected, write):
     assert len(compare_scene(scene, write(airlight=nan), margin=0.01).failures) == 1
 
 
-AREA_LIT = SCENE.replace(
-    '<emitter type="point"><point name="position" value="0.7, 0.3, 1.9"/></emitter>',
-    """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
+AREA = """<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
     <lookat origin="0.6, 0.3, 1.2" target="0.2, -4.1, 1.3" up="0, 0, 1"/></transform>
-    <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"/></shape>""",
-)
+    <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf><emitter type="area"/></shape>"""
 
 
 @pytest.fixture(scope="module")
 def area_lit(variant, tmp_path_factory):
     """A scene under an area light that the camera sees: its file, the scene at 16 x 12 pixels and its reference."""
     path = tmp_path_factory.mktemp("area") / "area.xml"
-    path.write_text(AREA_LIT)
+    path.write_text(scene_xml(AREA))
     loaded = load_scene(str(path), (16, 12))
     return str(path), loaded, reference_image(loaded.scene)
 
@@ -158,18 +144,6 @@ def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path,
     assert compared.reference_error > expected.airlight_se.mean() / expected.airlight.mean()
 
 
-@pytest.mark.parametrize("size", [(32, 24), (64, 48), (31, 23), (1, 1)])
-def test_sizes_of_the_same_aspect_are_taken(scene, variant, size):
-    film = scene_of_size(scene, size, "engine.exr").scene.sensors()[0].film()
-    assert tuple(film.size()) == size
-
-
-@pytest.mark.parametrize("size", [(32, 20), (24, 32), (100, 100)])
-def test_another_aspect_is_refused_with_the_scenes_own(scene, variant, size):
-    with refused("own is 32 x 24, 1.333 to 1"):
-        scene_of_size(scene, size, "engine.exr")
-
-
 def test_layers_that_are_not_there_are_refused(scene, expected, write):
     total = reference_layer(expected, "total")
     with refused("has no layer 'airlihgt'"):
@@ -180,12 +154,11 @@ def test_layers_that_are_not_there_are_refused(scene, expected, write):
     assert compare_scene(scene, file, layer="B.Combined").comparison.metrics.relative_rmse < 1e-6
 
 
-@pytest.mark.parametrize("size", [(1, 1), (4, 3)])
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, 3e38])
+@pytest.mark.parametrize(("size", "value"), [((1, 1), 0.0), ((4, 3), -1.0), ((1, 1), np.nan), ((4, 3), 3e38)])
 def test_odd_images_get_a_verdict_and_no_number_that_is_none(tmp_path, variant, size, value):
     """All warnings are errors in the tests; the text of an image without failures has no nan and no inf."""
     path = tmp_path / "own.xml"
-    path.write_text(SCENE.replace('"32"', f'"{size[0]}"').replace('"24"', f'"{size[1]}"'))
+    path.write_text(scene_xml(size=size))
     write_exr(
         tmp_path / "odd.exr", Image({"total": np.full((size[1], size[0], 3), value, dtype=np.float32)}), finite=False
     )

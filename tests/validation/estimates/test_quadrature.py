@@ -21,7 +21,7 @@ from validation.estimates.agreement import layer_masks, reference_estimate
 from validation.estimates.images import layered_reference
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer, reference_of_pixels
-from validation.scenes.loading import LoadedScene, load_scene
+from validation.scenes.loading import load_scene
 from validation.statistics.comparison import Estimate, compare_statistics
 
 
@@ -60,26 +60,12 @@ def test_second_call_reads_the_same_numbers(scene, own_cache, computed):
     assert np.isfinite(first.airlight).all()
 
 
-def test_other_phase_function_has_another_reference(scene, own_cache, computed):
-    """The phase function has no parameters that a key could see; an isotropic reference would pass for it."""
-    fog = tiny_scene()["fog"] | {"phase": {"type": "rayleigh"}}
-    plain = reference_image(scene, checks=4)
-    rayleigh = reference_image(mi.load_dict(tiny_scene(size=(8, 6), fog=fog)), checks=4)
-    assert len(computed) == 2
-    assert np.abs(rayleigh.airlight / plain.airlight - 1).max() > 0.05
-
-
 def test_the_reference_of_some_pixels_is_that_of_the_image(scene, own_cache):
     pixels = np.array([3, 4, 40, 7])
     some, whole = reference_of_pixels(scene, pixels), reference_image(scene)
     for layer in ("airlight", "surface", "distance", "light_angle"):
         values = getattr(whole, layer)
         np.testing.assert_array_equal(getattr(some, layer)[0], values.reshape(-1, *values.shape[2:])[pixels])
-
-
-@pytest.fixture
-def loaded(scene):
-    return LoadedScene("tiny", scene, "A tiny scene.", "")
 
 
 @pytest.mark.claim("area-light-goes-on")

@@ -13,7 +13,6 @@ from validation.estimates.transmittance import (
     jackknife,
     marches,
     naive,
-    orders,
     power_series,
     ratio_tracking,
     transmittance_errors,
@@ -37,14 +36,6 @@ def test_the_power_series_is_unbiased_by_enumeration():
         mean = np.sum(power_series(values[outcomes]) * odds[outcomes].prod(axis=1))
         total += (reach[order] - after) * mean
     assert total == pytest.approx(np.exp(-values @ odds), rel=1e-7)
-
-
-def test_orders_have_the_probabilities_of_the_roulette():
-    chosen = orders(np.random.default_rng(1), TIMES)
-    assert not np.any(chosen == 1)
-    assert np.mean(chosen >= 2) == pytest.approx(0.1, rel=0.02)
-    assert np.mean(chosen >= 3) == pytest.approx(0.1 * 2 / 3, rel=0.02)
-    assert chosen.mean() == pytest.approx(0.31945, rel=0.02)
 
 
 @pytest.mark.claim("transmittance-estimators", tolerance="1e-12: Gauss-Hermite of smooth functions")

@@ -13,19 +13,11 @@ import pytest
 from analytic.errors import InputError
 from reference.scene.read import read_reference
 from reference.storage.exr import Image
+from tests.helpers.scenes import scene_xml
 from validation.engine.seen import Seen
 from validation.estimates.quadrature import reference_image
-from validation.fit.confounding import confounded_groups
 from validation.fit.fit import fit_image
-from validation.fit.solve import (
-    ImageModel,
-    best_start,
-    interval_ends,
-    noise_of,
-    outliers,
-    robust_fit,
-    weighted_fit,
-)
+from validation.fit.solve import ImageModel, best_start, interval_ends, robust_fit, weighted_fit
 from validation.fit.unknowns import read_unknowns
 from validation.fog_model.radiance import scene_fog
 from validation.scenes.loading import load_scene
@@ -35,24 +27,12 @@ TOOLS = Path(__file__).resolve().parents[3] / "docs/tools"
 
 
 def scene_file(tmp_path, *, sigma_t="0.31", albedo="0.83", g="0.4", lights=1, position="0.7, 0.3, 1.9"):
-    second = '<emitter type="point" id="side"><point name="position" value="-1.1, 0.6, 0.4"/></emitter>'
-    kind = "rgb" if "," in sigma_t else "float"
+    lamps = [("lamp", position), ("side", "-1.1, 0.6, 0.4")][:lights]
+    light = '<emitter type="point" id="{}"><point name="position" value="{}"/></emitter>'
+    fog = f'<float name="sigma_t" value="{sigma_t}"/><float name="albedo" value="{albedo}"/>'
+    fog += f'<phase type="hg"><float name="g" value="{g}"/></phase>'
     path = tmp_path / "own.xml"
-    path.write_text(
-        f"""<scene version="3.0.0">
-    <medium type="homogeneous" id="fog"><{kind} name="sigma_t" value="{sigma_t}"/>
-        <float name="albedo" value="{albedo}"/>
-        <phase type="hg"><float name="g" value="{g}"/></phase></medium>
-    <emitter type="point" id="lamp"><point name="position" value="{position}"/></emitter>{second if lights > 1 else ""}
-    <sensor type="perspective">
-        <transform name="to_world"><lookat origin="0.2, -4.1, 1.3" target="0.1, 0, 0.6" up="0, 0, 1"/></transform>
-        <ref name="medium" id="fog"/>
-        <film type="hdrfilm"><integer name="width" value="{SIZE[0]}"/><integer name="height" value="{SIZE[1]}"/></film>
-    </sensor>
-    <shape type="sphere" id="ball"><float name="radius" value="0.4"/></shape>
-</scene>
-"""
-    )
+    path.write_text(scene_xml(*(light.format(*lamp) for lamp in lamps), fog=fog, size=SIZE))
     return str(path)
 
 
@@ -112,7 +92,7 @@ def test_each_of_several_lights_has_a_factor(variant, tmp_path):
     reference = read_reference(load_scene(scene).scene)
     pixels = SIZE[0] * SIZE[1]
     model = ImageModel.of(Seen(reference, np.ones((pixels, 3)), "airlight", np.ones(pixels, bool)))
-    bright = model.radiance(replace(model.fog, airlight=(1.4, 0.3), surface=(1.4, 0.3)))
+    bright = model.radiance(replace(model.fog, intensity=(1.4, 0.3)))
     image = Image({"airlight": bright.reshape(SIZE[1], SIZE[0], 3)})
     fit = fitted(image, scene, ["intensity", "sigma_t"])
     values = {each.name: each.value for each in fit.parameters}
@@ -194,31 +174,6 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
     # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once in 16 000, of which
     # nine are looked at.
     assert (covered >= 177).all(), covered / trials
-
-
-def test_noise_is_found_by_its_two_parts():
-    generator = np.random.default_rng(2)
-    radiance = np.exp(generator.normal(0, 2, 20_000))
-    sigma = np.hypot(0.3, 0.02 * radiance)
-    residual = sigma * generator.standard_normal(len(radiance))
-    residual[::50] += 100
-    estimated = noise_of(radiance, residual)
-    # 24 groups of 833 values each know their scatter to 4 %.
-    assert np.median(np.abs(estimated / sigma - 1)) < 0.06
-    pixels = outliers(residual[:, None] * np.ones(3), estimated[:, None])
-    assert pixels[::50].all()
-    assert pixels.mean() < 0.021
-
-
-def test_groups_of_dependent_columns():
-    generator = np.random.default_rng(3)
-    a, b, c = generator.standard_normal((3, 50))
-    assert confounded_groups(np.stack([a, b, c], axis=1)) == ()
-    (group,) = confounded_groups(np.stack([a, b, 2 * a, c], axis=1))
-    assert (group.members, group.held) == ((0, 2), (2,))
-    assert group.powers == {0: {2: pytest.approx(2.0)}}  # steps of (2, -1) change nothing: p_0 p_2^2 is known
-    (group,) = confounded_groups(np.stack([a, 0 * a], axis=1))
-    assert (group.members, group.held, group.powers) == ((1,), (1,), {})
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import pytest
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
-from validation.fog_model.places import panel_nodes
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import scattering_paths, view_of
 from validation.scenes.loading import load_scene
@@ -87,16 +86,3 @@ def test_laws_can_be_changed_one_by_one(variant):
         ({"exposure": (3.0, 1.0, 1.0)}, 3 * right[:, 0]),
     ):
         assert model.layers(replace(fog, **law))[0][:, 0] == pytest.approx(wanted, rel=1e-9)
-
-
-def test_nodes_integrate_what_they_should():
-    start, width = np.array([-3.0, 0.2, 1.0]), np.array([5.0, 0.4, 2.4])
-    owner, place, weight = panel_nodes(start, width)
-    assert np.bincount(owner, weight) == pytest.approx(width, rel=1e-14)
-    integral = np.bincount(owner, weight / np.cosh(place))
-    wanted = np.arctan(np.sinh(start + width)) - np.arctan(np.sinh(start))
-    assert integral == pytest.approx(wanted, rel=1e-7)
-    assert (np.diff(owner) >= 0).all()
-    owner, place, weight = panel_nodes(start, width, orders=(4, 2))
-    assert np.bincount(owner, weight / np.cosh(place)) == pytest.approx(wanted, rel=1e-3)
-    assert len(owner) == 4 * 3 + 2 + 4

@@ -140,19 +140,10 @@ def faults(cases, J, precision="single"):
 
 
 @pytest.mark.claim("underflow-breaks-no-bar")
-@pytest.mark.parametrize("kept", [0.0, 0.5, 1.0])
-def test_what_a_processor_flushes_on_the_way_breaks_no_bar(kept):
+def test_what_a_processor_flushes_on_the_way_breaks_no_bar_and_more_does():
     cases = flushed(*FLUSHED[::2])
-    assert faults(cases, kept * cases.value) == []
-
-
-@pytest.mark.claim("underflow-breaks-no-bar")
-def test_what_remains_after_flushing_some_terms_breaks_no_bar():
-    cases = flushed(FLUSHED[1])
-    assert faults(cases, [8.516171514327399e-32]) == []
-
-
-def test_more_than_can_be_flushed_breaks_it():
+    assert [faults(cases, kept * cases.value) for kept in (0.0, 0.5, 1.0)] == [[]] * 3
+    assert faults(flushed(FLUSHED[1]), [8.516171514327399e-32]) == []  # some terms are flushed
     cases = flushed(*FLUSHED)
     assert any("float32 maximum" in words for words in faults(cases, 10 * cases.value))
 
@@ -309,3 +300,42 @@ def test_reference_is_certified(rays):
         columns = (rays.foot, rays.height, rays.x0, rays.x1, rays.sigma_t)
         expected = integrate_certified(*(float(column[k]) for column in columns), phase, digits=16)
         assert rays.value[k] == pytest.approx(float(expected), rel=1e-12), tag
+
+
+HEAD = "phase,g,t,h,x0,x1,sigma_t\n"
+
+
+def test_both_files(data_folder):
+    cases = read_cases(data_folder / "airlight_integral.csv")
+    assert len(cases.phase) == len(cases.tag) == len(cases.rows) == 2004
+    assert cases.origin is None
+    assert np.isinf(cases.x1).any()
+    assert cases.header[0] == "tag"
+    rays = read_cases(data_folder / "airlight_integral_rays.csv")
+    assert rays.origin.shape == rays.direction.shape == rays.light.shape == (1002, 3)
+    assert rays.tag is None
+    assert (rays.height >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("phase,g,t,h,x0,x1\nhazy,0,1,1,0,1\n", "line 1: no column 'sigma_t'"),
+        (HEAD + "hazy,0,1,1,0,1,0.1\nhazy,0,1,one,0,1,0.1\n", "line 3, column 'h': 'one' is not a number"),
+        (HEAD + "hazy,0,1,-1,0,1,0.1\n", "line 2, column 'h': -1 is out of range; wanted a number >= 0"),
+        (
+            HEAD + "hazi,0,1,1,0,1,0.1\n",
+            "line 2, column 'phase': no phase function is called 'hazi'; did you mean 'hazy'",
+        ),
+        (HEAD + "tabulated,0,1,1,0,1,0.1\n", "no place for its table"),
+        (HEAD + "hazy,0,1,1,0,1\n", "line 2: 6 cells under a header of 7 columns"),
+        ("", "no lines"),
+        (
+            "phase,ox,oy,oz,dx,dy,dz,lx,ly,lz,x0,x1,sigma_t\nhazy,0,0,0,0,0,2,1,1,1,0,1,0.1\n",
+            "line 2, column 'dx': 0 is out of range; wanted a direction of length 1",
+        ),
+    ],
+)
+def test_what_is_no_table_of_cases_is_refused(tmp_path, text, message):
+    with pytest.raises(InputError, match=message):
+        read_cases(case_file(tmp_path, text))

@@ -98,28 +98,6 @@ def test_values_that_made_the_sequences_are_found(found):
     assert len(wrong) <= 0.1 * len(VALUES), wrong
 
 
-def test_a_change_of_the_reference_that_is_left_in_is_no_flicker(found):
-    faulty = math.sqrt(np.mean(np.diff(MADE["noise"], axis=0) ** 2)) / MEAN
-    flicker = found["noise"].flicker
-    assert missed(Estimate(faulty, flicker.error), flicker.value)
-
-
-def test_the_best_shift_is_no_lag(found):
-    shifts = range(-2, 4)
-    own = np.arange(3, FRAMES - 2)
-    off = [np.mean((MADE["history"][own] - LIGHT[own - shift]) ** 2) for shift in shifts]
-    assert missed(Estimate(shifts[int(np.argmin(off))], found["history"].lag.lag.error), 4.0)
-
-
-def test_one_over_the_weight_is_no_time_constant(found):
-    constant = found["history"].lag.time_constant
-    assert missed(Estimate(1 / WEIGHT, constant.error), -1 / math.log(1 - WEIGHT))
-
-
-def test_references_of_one_frame_late_are_another_lag(found):
-    assert missed(measured(MADE["history"], late(LIGHT, 1)).lag.lag, 4.0)
-
-
 def test_frames_of_a_history_are_no_independent_runs(found):
     """Intervals from their means would hold the bias, which is zero, far too rarely: none is given."""
     held = 0
@@ -132,9 +110,3 @@ def test_frames_of_a_history_are_no_independent_runs(found):
     assert found["history"].bias.error is None
     assert found["at rest"].bias.error is None
     assert found["noise"].bias.error is not None
-
-
-def test_time_reversed_turns_late_into_early():
-    frames = late(LIGHT, 1) + noise(5)
-    assert measured(frames).lag.delay == Estimate(1.0, 0.0)
-    assert measured(frames[::-1], LIGHT[::-1]).lag.delay == Estimate(-1.0, 0.0)

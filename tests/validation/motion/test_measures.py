@@ -96,13 +96,6 @@ def test_an_average_lags():
     assert motion_verdict(found).kind == "lag"
 
 
-def test_an_average_lags_in_noise():
-    found = measured(averaged(LIGHT) + noise(2, 0.1))
-    assert found.lag.lag.error < 0.05
-    assert abs(found.lag.lag.value - 9) < 4 * found.lag.lag.error
-    assert motion_verdict(found).kind == "lag"
-
-
 @pytest.mark.parametrize("sigma", [0.0, CHANGE])
 @pytest.mark.parametrize("delay", [-1, 1, 2])
 def test_frames_of_another_number_are_late(delay, sigma):

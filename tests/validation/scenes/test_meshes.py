@@ -7,11 +7,7 @@ import numpy as np
 import pytest
 
 from tests.helpers.meshes import is_closed, volume
-from validation.scenes.hypertexture import (
-    NOISE_BOUND,
-    gradient_noise,
-    octaves,
-)
+from validation.scenes.hypertexture import NOISE_BOUND, gradient_noise, octaves
 from validation.scenes.meshes import arch, box, gem, icosphere, lathe, prism, star, tetrahedron, torus
 from validation.scenes.registry import FILES, mesh_of
 

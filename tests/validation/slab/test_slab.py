@@ -133,10 +133,7 @@ def test_files_that_are_no_phase_function(text, words, tmp_path):
 
 @pytest.mark.parametrize(
     ("tau", "sun"),
-    [
-        (0.005, 0.0),
-        *(pytest.param(t, s, marks=pytest.mark.slow) for t in (1e-6, 0.005, 210.0) for s in (0.0, 89.99)),
-    ],
+    [(0.005, 0.0), *(pytest.param(t, s, marks=pytest.mark.slow) for t in (1e-6, 0.005, 210.0) for s in (0.0, 89.99))],
 )
 def test_hard_cases_have_finite_numbers(tau, sun):
     numbers = slab_numbers(
@@ -182,12 +179,7 @@ def test_orders_are_those_of_volpath(variant, side):
                 "type": "cube",
                 "to_world": mi.ScalarTransform4f().scale([_WIDE, _WIDE, TAU / 2]),
                 "bsdf": {"type": "null"},
-                "interior": {
-                    "type": "homogeneous",
-                    "sigma_t": 1.0,
-                    "albedo": ALBEDO,
-                    "phase": {"type": "hg", "g": G},
-                },
+                "interior": {"type": "homogeneous", "sigma_t": 1.0, "albedo": ALBEDO, "phase": {"type": "hg", "g": G}},
             },
             "meter": {
                 "type": "rectangle",

@@ -34,20 +34,6 @@ def refused(text):
     return pytest.raises(InputError, match=re.escape(text))
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        (("raymarch",), "did you mean 'ray-march'?"),
-        (("unshadowed", "quadratur"), "did you mean 'quadrature'?"),
-        (("ray-march", "taylor"), "calls no kernel"),
-        (("ray-march", None, {"step": 7}), "did you mean 'steps'?"),
-    ],
-)
-def test_what_no_configuration_has_is_refused_by_name(given, words):
-    with refused(words):
-        configuration(*given)
-
-
 def test_words_become_values_of_the_type_of_the_default():
     chosen = configuration("ray-march", None, {"steps": "17", "shadow": "map", "map": " 64 "})
     assert chosen == Configuration("ray-march", None, (("steps", 17), ("shadow", "map"), ("map", 64)))
@@ -74,10 +60,6 @@ def test_chosen_methods_bring_their_standard_configurations():
 
 def test_settings_are_read():
     assert parse_settings(["steps=100", " shadow = map ", "a=b=c"]) == {"steps": "100", "shadow": "map", "a": "b=c"}
-    assert parse_settings([]) == {}
-
-
-def test_a_setting_given_twice_is_refused_unless_both_say_the_same():
     with refused("--set: got points=3 and points=5, wanted one of them"):
         parse_settings(["points=3", "pattern=grid", "points=5"])
     assert parse_settings(["points=3", " points = 3"]) == {"points": "3"}

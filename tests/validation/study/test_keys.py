@@ -85,21 +85,16 @@ def test_a_random_scene_is_its_seed_and_the_content_of_its_files(tmp_path):
 
 
 def test_a_users_code_is_in_the_key(tmp_path):
-    """The kernel's too, and that of the modules beside it."""
-    (tmp_path / "fog_kernel.py").write_text("from beside_it import two\n\n\ndef kernel(x):\n    return two * x\n")
-    (tmp_path / "beside_it.py").write_text("two = 2\n")
-    own = f"{tmp_path / 'fog_kernel.py'}:kernel"
-    for chosen in (Configuration("shadow-planes", own), Configuration(own, "exact")):
-        cell = replace(CELL, chosen=chosen)
-        (tmp_path / "beside_it.py").write_text("two = 2\n")
-        first = cell_key(cell, MADE)
-        assert cell_key(cell, MADE) == first
-        (tmp_path / "beside_it.py").write_text("two = 2.5\n")
-        assert cell_key(cell, MADE) != first
-    # What has no file cannot be compared, and is computed again.
-    assert cell_key(replace(CELL, chosen=Configuration("gone:f")), MADE) != cell_key(
-        replace(CELL, chosen=Configuration("gone:f")), MADE
-    )
+    """The method's and the kernel's; `tests/reference/storage/test_kept.py` says which modules count with it."""
+    own = tmp_path / "fog_kernel.py"
+    for chosen in (Configuration("shadow-planes", f"{own}:kernel"), Configuration(f"{own}:kernel", "exact")):
+        keys = []
+        for factor in (2, 2, 3):
+            own.write_text(f"def kernel(x):\n    return {factor} * x\n")
+            keys.append(cell_key(replace(CELL, chosen=chosen), MADE))
+        assert keys[0] == keys[1] != keys[2]
+    gone = replace(CELL, chosen=Configuration("gone:f"))
+    assert cell_key(gone, MADE) != cell_key(gone, MADE)  # what has no file is computed again
 
 
 MARCHED = Cell("random:7", (16, 12), ("medium.sigma_t=0.1",), Configuration("ray-march", None, (("steps", 4),)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors fall with the size of maps as they say; the parts of an error by its causes add up to the whole."""
+"""Errors fall with the size of maps as they say, their parts by causes add up, and histories lag by their weight."""
 
 import math
 
@@ -7,14 +7,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import spot, tiny_scene
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
+from validation.scenes.loading import load_scene
 from validation.scenes.registry import Animation
 from validation.study.causes import decompose
-from validation.study.configuration import configuration, prepared
+from validation.study.configuration import Configuration, configuration, named_configurations, prepared
 from validation.study.growth import fitted_exponent
 from validation.study.motion import method_motion
 
@@ -121,3 +123,38 @@ def test_a_method_of_ones_own_is_rendered_by_its_caller(variant):
     whole = split("tests.helpers.veil:Veil", render=render)
     assert asked == ["tests.helpers.veil:Veil"]
     assert causes(whole) == [("rest", "reference")]
+
+
+USUAL = named_configurations("motion")
+
+
+@pytest.mark.claim("history-lag", tolerance="0.01 frames: float32 beside the light")
+def test_a_history_lags_by_its_weight_and_planes_do_not(variant):
+    loaded = load_scene("open-fog", (32, 24))
+    before = np.array(loaded.scene.emitters()[0].world_transform().matrix)
+    averaged = Configuration("unshadowed+history", "exact", (("alpha", 0.1),))
+    rows = method_motion(loaded.scene, loaded.animation, [USUAL[0], averaged], frames=16, turn=240)
+    planes, late = (row.measures for row in rows)
+    assert planes.relative_rmse.value < 1e-5  # float32 beside the light
+    assert abs(planes.lag.lag.value) < 1e-4
+    assert late.lag.lag.value == pytest.approx(9, abs=0.01)
+    assert late.lag.persistence.above(4)
+    assert late.flicker_beside_lag.value < late.flicker.value
+    np.testing.assert_array_equal(np.array(loaded.scene.emitters()[0].world_transform().matrix), before)
+
+
+def test_a_noisy_march_with_history_is_measured_in_several_runs(variant):
+    loaded = load_scene("open-fog", (32, 24))
+    (row,) = method_motion(loaded.scene, loaded.animation, [USUAL[3]], frames=16, turn=240, runs=3)
+    # Of 0.1 for the newest frame 9 frames are expected; errors are those of three runs, Student's 2 degrees.
+    lag, bias = row.measures.lag.lag, row.measures.bias
+    assert abs(lag.value - 9) < 0.5 + 10 * lag.error
+    assert 0 < bias.error < row.measures.relative_rmse.value
+
+
+def test_what_does_not_move_is_refused(variant):
+    loaded = load_scene("penumbra-plane", (16, 12))
+    with pytest.raises(InputError, match="area lights"):
+        method_motion(loaded.scene, loaded.animation, USUAL[:1])
+    with pytest.raises(InputError, match="wanted at least 10 for a step"):
+        method_motion(loaded.scene, loaded.animation, USUAL[:1], stimulus="step", frames=9)
