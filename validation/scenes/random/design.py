@@ -49,7 +49,10 @@ class Draws:
         self._point = point(seed) if not part else {}
 
     def of(self, part: str) -> "Draws":
-        """Return the stream of a part of the scene: what one part draws does not move the others."""
+        """Return the stream of a part of the scene: what one part draws does not move the others.
+
+        The name of the part is a seed: with another name, old seeds would be other scenes.
+        """
         return Draws(self._seed, self._attempt, part)
 
     def share(self, name: str = "") -> float:
