@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The fast route: every certified value, the laws that J obeys, weights, shortened shadow rays, hard corners."""
+"""The airlight integral: every certified value, three forms, the laws, weights, shortened shadow rays, hard corners."""
 
 import itertools
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from analytic.errors import InputError
-from analytic.panels import airlight_segments
+from analytic.geometry import foot_and_height
+from analytic.panels import airlight_segments, log_distance
 from analytic.phase import PhaseFunction
 from validation.kernels.case_files import integrate_cases, read_cases
 
@@ -172,3 +174,103 @@ def test_refusals(change, message):
     arguments = {"foot": 1.0, "height": 1.0, "x0": 0.0, "x1": 2.0, "sigma_t": 0.1, "phase": ISOTROPIC}
     with pytest.raises(InputError, match=message):
         airlight_segments(**(arguments | change))
+
+
+# In the distance, the angle and the path -----------------------------------------------------------------------------
+
+
+FORM_PHASES = [
+    PhaseFunction("rayleigh"),
+    PhaseFunction("murky"),
+    PhaseFunction("hg", g=-0.9),
+    PhaseFunction("tabulated", table=[1.0, 0.0, 3.0, 0.2, 9.0]),
+]
+
+
+@pytest.mark.claim("integral-three-forms", tolerance="1e-10 relative")
+@pytest.mark.parametrize("phase", FORM_PHASES, ids=lambda phase: phase.name)
+def test_three_forms_are_one_integral(phase):
+    rng = np.random.default_rng(17)
+    for _ in range(6):
+        foot, height, x0, length, sigma_t = rng.uniform((-2, 0.2, 0, 0.1, 0), (6, 2, 2, 8, 1))
+
+        def distance(s, foot=foot, height=height, sigma_t=sigma_t):
+            r = np.hypot(height, s)
+            return np.exp(-sigma_t * (foot + s + r)) * phase(-s / r) / r**2
+
+        def angle(theta, foot=foot, height=height, sigma_t=sigma_t):
+            way = foot + height * np.tan(theta / 2 + np.pi / 4)
+            return np.exp(-sigma_t * way) * phase(-np.sin(theta)) / height
+
+        def path(q, foot=foot, height=height, sigma_t=sigma_t):
+            cosine = (height**2 - q**2) / (height**2 + q**2)
+            return np.exp(-sigma_t * (foot + q)) * phase(cosine) * 2 / (q**2 + height**2)
+
+        # From x0 to the end, in pieces between which a table has its kinks.
+        kinks = -height * phase.kinks / np.sqrt(1 - phase.kinks**2)
+        s = np.clip(np.sort([x0 - foot, *kinks, x0 + length - foot]), x0 - foot, x0 + length - foot)
+        forms = (distance, s), (angle, np.arctan(s / height)), (path, s + np.hypot(s, height))
+        expected, _ = airlight_segments(foot, height, x0, x0 + length, sigma_t, phase)
+        for form, ends in forms:
+            pieces = [quad(form, a, b, epsabs=0, epsrel=1e-12)[0] for a, b in pairwise(ends) if b > a]
+            # What the panels are asked for; the pieces are right to 1e-12.
+            assert sum(pieces) == pytest.approx(expected[0], rel=1e-10)
+
+
+# Geometry: no digits are lost close to the light ---------------------------------------------------------------------
+
+
+EPSILON = np.finfo(float).eps
+
+
+def float32_rays(count, miss):
+    """Rays with float32 coordinates that pass a light at about the distance `miss`."""
+    rng = np.random.default_rng(20061)
+    origin = rng.uniform(-20, 20, (count, 3)).astype(np.float32)
+    direction = rng.normal(size=(count, 3))
+    direction = (direction / np.linalg.norm(direction, axis=1)[:, None]).astype(np.float32)
+    light = origin + rng.uniform(1, 30, (count, 1)) * direction + miss * rng.normal(size=(count, 3))
+    return origin.astype(float), direction.astype(float), light.astype(np.float32).astype(float)
+
+
+@pytest.mark.parametrize("miss", [3.0, 1e-3, 0.0])
+def test_foot_and_height_against_mpmath(miss):
+    from mpmath import matrix, mp, mpf, workdps
+
+    origin, direction, light = float32_rays(50, miss)
+    foot, height = foot_and_height(origin, direction, light)
+    for row in range(50):
+        with workdps(60):
+            o, d, p = (matrix([mpf(float(v)) for v in column[row]]) for column in (origin, direction, light))
+            length = mp.norm(d)
+            v = p - o
+            along = (v.T * d)[0] / length
+            across = mp.norm(v - d * (along / length))
+            # The height is right to a few ulp however close the ray passes (light - origin is exact for most float32
+            # numbers, else it costs one rounding of the larger coordinate).
+            slack = 8 * EPSILON * across + EPSILON * mp.norm(v)
+            assert abs(mpf(float(height[row])) - across) <= slack
+            assert abs(mpf(float(foot[row])) - along) <= 4 * EPSILON * mp.norm(v)
+
+
+finite = st.floats(min_value=-1e3, max_value=1e3)
+positive_heights = st.floats(min_value=1e-6, max_value=1e3)
+
+
+@pytest.mark.claim("path-keeps-digits")
+@given(x=finite, foot=finite, height=positive_heights)
+def test_the_path_satisfies_its_equation(x, foot, height):
+    s, q = x - foot, height * float(log_distance(*np.array([foot, height, x, x + 1]))[1])
+    assert q > 0
+    # (q - s)^2 = r^2 is where q came from; written as q^2 - 2 q s = h^2 and scaled by its largest term
+    assert abs(q * q - 2 * q * s - height**2) <= 12 * EPSILON * (q * q + 2 * abs(q * s) + height**2)
+
+
+@pytest.mark.claim("path-keeps-digits", tolerance="6 roundings")
+def test_the_path_does_not_cancel_before_the_light():
+    from mpmath import mpf, sqrt, workdps
+
+    with workdps(50):
+        expected = float(mpf(-1000) + sqrt(mpf(1000) ** 2 + mpf(1e-4) ** 2))
+    q = 1e-4 * float(log_distance(*np.array([1000.0, 1e-4, 0.0, 1.0]))[1])
+    assert q == pytest.approx(expected, rel=6 * EPSILON)
