@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Both sides read the same scene; area lights and clouds are read as they are, rays and the epsilon are Mitsuba's."""
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -6,9 +8,18 @@ import pytest
 from analytic.errors import InputError
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
+from reference.scene.area_light import triangle_normals
 from reference.scene.camera import film_positions, pixel_centres
+from reference.scene.clouds import read_clouds
 from reference.scene.read import read_reference
+from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from reference.scene.shapes import read_shapes
+from tests.helpers.area_lights import NULL, lamp, lit_scene, mesh_lamp
+from tests.helpers.lamps import area_lamp
 from tests.helpers.scenes import spot, tiny_scene
+from validation.scenes import meshes
+from validation.scenes.meshes import icosphere, placed, torus
+from validation.scenes.parts import camera, fog, medium_boundary, mitsuba_mesh, point_light, sky, sun
 
 
 def test_both_sides_read_the_same_scene(variant):
@@ -49,14 +60,135 @@ def test_rays_are_those_of_mitsuba(variant, principal):
     assert np.isnan(found[len(position) :]).all()
 
 
-@pytest.mark.claim("scenes-refused-by-name")
+@pytest.mark.claim("shadow-ray-epsilon")
+def test_equals_mitsubas_constant(variant):
+    # maxt is rounded to float32, half a unit in the last place of a number just below 2: 6e-8, relative to 2
+    assert measure_shadow_epsilon() == pytest.approx(mi.math.ShadowEpsilon, abs=6e-8)
+
+
+@pytest.mark.parametrize("scale", [[2.0, 1.0, 1.0], [1.0, 2.0, 0.5], [-1.5, 1.5, 1.5]])
+def test_a_stretched_sphere_is_the_sphere_that_mitsuba_makes_of_it(variant, scale):
+    """Mitsuba warns of it, and intersects a sphere whose radius is the first of the scales."""
+    turned = mi.ScalarTransform4f().translate([0.3, 0.2, 0.1]).rotate([0.0, 0.6, 0.8], 40.0).scale(scale)
+    scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere", "to_world": turned, "flip_normals": True}})
+    shapes = read_shapes(scene)
+    assert shapes.radius == pytest.approx(abs(scale[0]), rel=1e-6)
+    direction = np.random.default_rng(3).normal(size=(3, 50))
+    direction /= np.linalg.norm(direction, axis=0)
+    start = shapes.centre[0][:, None] + 7 * direction
+    hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(start), mi.Vector3f(-direction)), coherent=False)
+    assert np.array(hit.t) == pytest.approx(7 - shapes.radius.item(), rel=1e-5)
+
+
+def test_shapes_are_sorted_and_others_refused_by_name(variant):
+    disk = {"type": "disk", "to_world": mi.ScalarTransform4f().translate([0, 0, 3])}
+    shapes = read_shapes(mi.load_dict(tiny_scene(lid=disk)))
+    assert shapes.triangles.shape == (2, 3, 3)
+    assert shapes.centre == pytest.approx(np.array([[0.1, 0.1, 0.7]]), rel=1e-6)
+    assert shapes.disks.centre == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
+    with pytest.raises(InputError, match="'lid' is a cylinder; wanted meshes, rectangles, spheres and disks"):
+        read_shapes(mi.load_dict(tiny_scene(lid=disk | {"type": "cylinder"})))
+    oval = disk | {"to_world": mi.ScalarTransform4f().scale([1.0, 2.0, 1.0])}
+    with pytest.raises(InputError, match="'lid' is an oval disk"):
+        read_shapes(mi.load_dict(tiny_scene(lid=oval)))
+
+
+# Area lights ---------------------------------------------------------------------------------------------------------
+
+
+def place(scale=(0.5, 0.25, 1.0), turn=37.0, move=(0.1, 0.2, 3.0)):
+    return mi.ScalarTransform4f().translate(list(move)).rotate([0.6, 0.0, 0.8], turn).scale(list(scale))
+
+
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("kind", "size", "area"),
     [
-        ({"lamp": None}, "no light"),
-        ({"lamp": None, "sky": {"type": "constant"}}, "light 'sky' is a sky: nothing of it arrives"),
+        ("rectangle", (0.31, 0.17), 4 * 0.31 * 0.17),
+        ("disk", 0.29, np.pi * 0.29**2),
+        ("sphere", 0.23, 4 * np.pi * 0.23**2),
     ],
 )
-def test_refusals(variant, changes, message):
-    with pytest.raises(InputError, match=message):
-        read_reference(mi.load_dict(tiny_scene(**changes)))
+def test_both_sides_read_the_same_area_light(variant, kind, size, area):
+    """Its place, sides, area and power, by hand."""
+    scene = mi.load_dict(tiny_scene(lamp=area_lamp(kind, size=size)))
+    light, other = read_reference(scene).area[0], read_scene(scene).area_lights[0]
+    for each, middle in ((light, light.centre), (other, other.middle)):
+        assert (each.name, each.kind, each.opaque) == ("lamp", kind, True)
+        assert each.area == pytest.approx(area, rel=1e-6)
+        np.testing.assert_allclose(each.power, np.pi * area * np.array([5.3, 4.1, 2.9]), rtol=1e-6)
+        np.testing.assert_allclose(middle, [0.83, 0.61, 1.97], rtol=1e-6)
+        if kind != "sphere":
+            toward = np.array([0.13, 0.07, 0.31]) - middle
+            np.testing.assert_allclose(each.normal, toward / np.linalg.norm(toward), atol=1e-6)
+    if kind == "rectangle":
+        assert light.half == pytest.approx(size, rel=1e-6)
+        corner = light.centre + light.half @ light.frame[:2]
+        corners = other.middle + np.array([1, -1])[:, None, None] * other.across + np.array([1, -1])[:, None] * other.up
+        assert np.abs(corners - corner).max(axis=-1).min() < 1e-6
+    else:
+        assert light.radius == pytest.approx(size, rel=1e-6)
+    clear = mi.load_dict(tiny_scene(lamp=area_lamp(kind, size=size, material=NULL)))
+    assert not read_reference(clear).area[0].opaque
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "disk"])
+@pytest.mark.parametrize("change", [{}, {"flip_normals": True}, {"mirror": (-1, 1, 1)}, {"mirror": (1, 1, -1)}])
+def test_normal_is_that_of_the_side_that_mitsuba_lets_emit(variant, kind, change):
+    mirror = np.array(change.get("mirror", (1, 1, 1)))
+    shape = {"flip_normals": True} if "flip_normals" in change else {}
+    scene = lit_scene(lamp=lamp(kind, to_world=place(scale=(0.5 * mirror).tolist()), **shape))
+    light = read_reference(scene).area[0]
+    for side in (1, -1):
+        ray = mi.Ray3f(mi.Point3f(light.centre + side * light.normal), mi.Vector3f(-side * light.normal))
+        hit = scene.ray_intersect(ray)
+        assert (np.array(hit.emitter(scene).eval(hit)).max() > 0) == (side > 0)
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_mesh_shines_on_the_side_that_mitsuba_lets_emit(variant, flipped):
+    scene = lit_scene(lamp=mesh_lamp(meshes.placed(meshes.icosphere(1), (0.1, 0.2, 4.0)), flipped=flipped))
+    light = read_reference(scene).area[0]
+    assert (light.kind, light.name, light.shadows_itself) == ("mesh", "lamp", flipped)
+    normal = triangle_normals(light.triangles)
+    middle = light.triangles.mean(axis=1)
+    assert np.all((np.sum(normal * (middle - light.centre), axis=1) < 0) == flipped)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    ray = mi.Ray3f(mi.Point3f((middle + 1e-2 * normal).T), mi.Vector3f(-normal.T))
+    hit = scene.ray_intersect(ray)
+    assert (np.array(hit.emitter(scene).eval(hit)) > 0).all()
+
+
+# Clouds --------------------------------------------------------------------------------------------------------------
+
+
+def cloud(mesh, name="puff"):
+    return medium_boundary(name, mesh, fog(0.7, (0.9, 0.9, 0.9)))
+
+
+def read_clouds_of(**parts):
+    usual = {
+        "sensor": camera((0.3, -7.1, 0.7), (0, 0, 0), fov=41.0, size=(4, 3), in_fog=False),
+        "sun": sun((0.1, 0.2, -0.9), (1.3, 1.1, 0.9)),
+    }
+    return read_clouds(mi.load_dict({"type": "scene"} | {k: v for k, v in (usual | parts).items() if v is not None}))
+
+
+def test_non_convex_and_several_clouds_are_read(variant):
+    clouds = read_clouds_of(a=cloud(torus(0.9, 0.3, (17, 9)), "a"), b=cloud(placed(icosphere(1), (2.9, 0, 0)), "b"))
+    assert [each.name for each in clouds.clouds] == ["a", "b"]
+    assert clouds.camera_cloud == -1
+    inside = read_clouds_of(puff=cloud(torus(0.9, 0.3, (17, 9))), b=None)
+    assert len(inside.suns) == 1
+
+
+def test_other_lights_and_scenes_without_clouds_are_refused(variant):
+    ball = icosphere(1)
+    with pytest.raises(InputError, match="light 'lamp' is a PointLight; clouds are lit by"):
+        read_clouds_of(puff=cloud(ball), lamp=point_light((0, 0, 4), (1.0, 1.1, 1.2)))
+    with pytest.raises(InputError, match="the scene has no cloud"):
+        read_clouds_of(a=mitsuba_mesh("solid", ball, (0.3, 0.4, 0.5)))
+    with pytest.raises(InputError, match="no light; wanted"):
+        read_clouds_of(puff=cloud(ball), sun=None)
+    np.testing.assert_allclose(
+        read_clouds_of(puff=cloud(ball), sky=sky((0.1, 0.2, 0.3))).sky, (0.1, 0.2, 0.3), rtol=1e-6
+    )

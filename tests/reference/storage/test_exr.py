@@ -237,13 +237,6 @@ def test_the_image_is_the_frame_whatever_window_a_file_holds(tmp_path):
         read_exr(tmp_path / "far.exr")
 
 
-def test_refuses_parts_with_one_name(tmp_path):
-    plane = np.ones((3, 4), np.float32)
-    write_parts(tmp_path / "c.exr", [("one", {}, {"x.R": plane}), ("two", {}, {"x.R": plane})])
-    with pytest.raises(InputError, match=r"'x\.R' in two"):
-        read_exr(tmp_path / "c.exr")
-
-
 def test_a_full_disk_names_the_file_and_leaves_it(tmp_path):
     """OpenEXR says in words what the system said; a limit on the size of a file stands for the disk."""
     write_exr(tmp_path / "a.exr", Image({"surface": np.zeros((2, 2, 3))}))

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lit intervals of point lights, samples of lights and suns: against the definition, closed forms, and cast rays."""
+"""Lit intervals of point lights, samples, spots and suns: against the definition, closed forms, and cast rays."""
 
 from dataclasses import replace
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import reference.quadrature.light_airlight as light_airlight
 import reference.quadrature.ray_values as quadrature
-from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
+from reference.scene.read import ReferenceLight, read_reference
 from reference.scene.shapes import Disks, Shapes
 from reference.visibility.candidates import Ball, near_shapes
 from reference.visibility.certificate import EXACT_EDGE, certified, segments_blocked
 from reference.visibility.lit_intervals import Obstacles, lit_intervals, reaches
-from reference.visibility.planes import rays_at
+from reference.visibility.planes import cone_interval, falloff, rays_at
 from tests.helpers.polygons import box_scene, rays_of
-from tests.helpers.scenes import tiny_scene
+from tests.helpers.scenes import spot, tiny_scene
 from validation.scenes.loading import load_scene
 
 
@@ -154,13 +154,6 @@ def setup(scene):
     return reference, *rays_of(reference)
 
 
-@pytest.mark.claim("exact-shadows")
-def test_other_shapes_are_refused(variant):
-    pipe = {"type": "cylinder", "p0": [0.7, -0.2, 0.1], "p1": [0.8, 0.1, 1.3], "radius": 0.1}
-    with pytest.raises(InputError, match="'pipe' is a cylinder; wanted meshes, rectangles, spheres and disks"):
-        setup(tiny_scene(pipe=pipe))
-
-
 @pytest.mark.claim("shadow-ray-certificate")
 def test_the_certificate_is_clean_and_notices_a_fault(variant):
     """Intervals from which one box is missing contradict the shadow rays, and the test of all triangles."""
@@ -216,3 +209,46 @@ def test_a_built_in_scene_is_certain_to_1e_minus_5(variant):
     assert np.mean(reached[image.airlight > 0]) > 0.999
     assert (image.disagreements, image.left) == (0, 0)
     assert image.checked == 32 * 32 * 24
+
+
+# Spots ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.claim("spot-falloff")
+@pytest.mark.parametrize("degrees", [2.0, 31.0, 78.0, 89.5])
+def test_interval_against_sampling(degrees):
+    rng = np.random.default_rng(13)
+    axis = np.array([0.3, -0.8, 0.5]) / np.linalg.norm([0.3, -0.8, 0.5])
+    angle = np.deg2rad(degrees)
+    light = ReferenceLight(np.array([0.2, 0.5, -0.4]), np.ones(3), axis, angle, angle)
+    origin = np.array([1.1, -0.7, 0.9])
+    direction = rng.normal(size=(500, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    rays = rays_at(origin, direction, light.position)
+    low, high = cone_interval(rays, light, angle)
+    theta = np.linspace(-0.499 * np.pi, 0.499 * np.pi, 401)
+    away = direction[:, None] * np.sin(theta)[:, None] + rays.normal[:, None] * np.cos(theta)[:, None]
+    cosine = away @ axis
+    clear = np.abs(cosine - np.cos(angle)) > 1e-9
+    inside = (theta >= low[:, None]) & (theta <= high[:, None])
+    assert np.array_equal(inside[clear], (cosine > np.cos(angle))[clear])
+    assert inside.any()
+
+
+@pytest.mark.claim("spot-falloff", tolerance="2e-5: acos of a float32 cosine")
+def test_profile_is_that_of_mitsuba(variant):
+    scene = mi.load_dict(tiny_scene(lamp=spot(cutoff=37.0, beam=14.0)))
+    reference = read_reference(scene)
+    light = reference.lights[0]
+    rays = rays_at(reference.origin, reference.direction, light.position)
+    normal = rays.normal
+    theta = np.linspace(-1.3, 1.3, 57)
+    value = falloff(np.broadcast_to(theta, (len(normal), 57)), rays, light)
+    away = reference.direction[:, None] * np.sin(theta)[:, None] + normal[:, None] * np.cos(theta)[:, None]
+    interaction = dr.zeros(mi.Interaction3f, away[..., 0].size)
+    interaction.p = mi.Point3f((light.position + away).reshape(-1, 3).T)
+    _, arriving = scene.emitters()[0].sample_direction(interaction, mi.Point2f(0.5))
+    expected = np.array(arriving)[0].reshape(value.shape) / light.intensity[0]
+    assert np.max(np.abs(value - expected)) < 2e-5  # acos of a float32 cosine close to 1
+    assert value.max() == 1
+    assert value.min() == 0

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: paths through clouds give the light of each order: DISORT's in a slab, Mitsuba's `volpath` elsewhere."""
+"""Claim: paths through clouds give the light of each order: DISORT's in a slab, Mitsuba's `volpath` elsewhere.
+
+In clouds with densities the opacity is the sum over the grid, and an even grid is a homogeneous cloud.
+"""
 
 import math
 from dataclasses import replace
@@ -10,14 +13,16 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm, t
 
+from analytic.errors import InputError
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from reference.monte_carlo.batches import merged
 from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
 from reference.monte_carlo.cloud_paths.opacity import seen_clouds
 from reference.monte_carlo.volpath.orders import volpath_orders_batch
 from reference.scene.clouds import read_clouds
+from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, dense, length_inside, linear_between
 from validation.scenes.loading import load_scene
-from validation.scenes.meshes import grid
+from validation.scenes.meshes import box, grid, placed
 from validation.scenes.parts import camera, mitsuba_mesh, sky, sun
 from validation.slab.radiance import slab_radiance
 
@@ -82,16 +87,17 @@ def scenes():
     }
 
 
-def z_of(first, second, layer):
-    """Return by how many standard errors the image means of a layer differ, in each channel."""
-    (a, va), (b, vb) = (
-        (
-            each.totals[:, each.layers.index(layer)].mean(0),
-            each.totals[:, each.layers.index(layer)].var(0, ddof=1) / len(each.seeds),
+def check_equal(first, second, least, layers=()):
+    """Assert that image means agree; the errors of these layers, or of all that have light, are below `least`."""
+    for layer in second.layers:
+        (a, va), (b, vb) = (
+            (own.mean(0), own.var(0, ddof=1) / len(own))
+            for own in (each.totals[:, each.layers.index(layer)] for each in (first, second))
         )
-        for each in (first, second)
-    )
-    return np.where(va + vb > 0, (a - b) / np.sqrt(np.maximum(va + vb, 1e-300)), 0.0)
+        z = np.where(va + vb > 0, (a - b) / np.sqrt(np.maximum(va + vb, 1e-300)), 0.0)
+        assert np.abs(z).max() < 4, layer
+        if layer in layers if layers else a.any():
+            assert np.all(np.sqrt(va) < least * a), "too few paths to say anything"
 
 
 @pytest.mark.slow
@@ -109,13 +115,7 @@ def test_every_order_is_that_of_volpath(variant, name):
     sets, batches = [("1", (1, 1)), ("2-inf", (2, math.inf))], 32  # few sets: each compiles a kernel of Mitsuba
     ours = paths(clouds, batches, 256, sets)
     theirs = reduce(merged, (volpath_orders_batch(clouds, seed, 256, sets=sets) for seed in range(batches)))
-    for layer in theirs.layers:
-        assert np.abs(z_of(ours, theirs, layer)).max() < 4, layer
-        if ours.mean[ours.layers.index(layer)].any():
-            spread = ours.totals[:, ours.layers.index(layer)]
-            assert np.all(spread.std(0, ddof=1) / math.sqrt(batches) < 0.04 * spread.mean(0)), (
-                "too few paths to say anything"
-            )
+    check_equal(ours, theirs, 0.04)
 
 
 def slab_rays():
@@ -214,3 +214,73 @@ def test_layers_add_up_and_seeds_give_the_same_numbers(variant):
     few = paths(clouds, 2, 16, sets=SETS[1:2])
     np.testing.assert_array_equal(few.mean[2], one.mean[3])
     np.testing.assert_allclose(few.mean[0], one.mean[0], rtol=1e-6, atol=1e-12)
+
+
+# Clouds with densities -----------------------------------------------------------------------------------------------
+
+
+LOW, HIGH = np.array([-91.3, -73.9, -52.7]), np.array([111.7, 79.3, 61.1])
+ROUGH = np.random.default_rng(5).random((9, 8, 7)) ** 3
+
+
+def clouds_of(medium=None, **parts):
+    mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))
+    scene = cloud_scene(sun=SUN, sky=sky((0.06, 0.11, 0.2)), box=cloud("box", mesh, medium), **parts)
+    return read_clouds(mi.load_dict(scene))
+
+
+def rough(**changes):
+    return dense(changes.pop("values", ROUGH), LOW, HIGH, **{"sigma_t": 0.0517, "albedo": 0.96} | changes)
+
+
+@pytest.mark.statistical
+@pytest.mark.claim(
+    "hypertexture-reference", tolerance="4 standard errors of the image mean, one comparison in 16 000 by chance"
+)
+def test_an_even_grid_is_a_homogeneous_cloud(variant):
+    """Half the largest density everywhere but in a corner without cloud: flights end where nothing is."""
+    values = np.full((40, 40, 40), 0.5)
+    values[0, 0, 0] = 1.0  # beyond the box but for a share of 1e-5 of a voxel
+    even = paths(clouds_of(rough(values=values)), 24, 256)
+    homogeneous = paths(clouds_of(DROPLETS | {"sigma_t": 0.5 * 0.0517, "albedo": 0.96}), 24, 256, first=100)
+    check_equal(even, homogeneous, 0.02, ("airlight", "airlight_1"))
+
+
+def test_opacity_is_the_sum_over_the_grid(variant):
+    clouds = clouds_of(rough())
+    mesh = placed(box(tuple(HIGH - LOW - 2.6)), tuple(0.5 * (LOW + HIGH)))
+    seen = seen_clouds(clouds)
+    checked = 0
+    for way, found in zip(clouds.direction, seen.transmittance):
+        length = length_inside(mesh, clouds.origin, way)
+        if not length:
+            continue
+        near = (np.where(way > 0, LOW + 1.3, HIGH - 1.3) - clouds.origin) / way
+        places = near.max() + length * (np.arange(8000) + 0.5) / 8000
+        rho = linear_between(ROUGH, LOW, HIGH, clouds.origin + places[:, None] * way)
+        assert found[0] == pytest.approx(math.exp(-0.0517 * length * rho.mean()), rel=1e-3)
+        checked += 1
+    assert checked > 20
+
+
+@pytest.mark.claim("hypertexture-refused", tolerance="none: an error and its words")
+def test_what_is_no_density_is_refused_by_name(variant):
+    wrong = ROUGH.copy()
+    wrong[3, 2, 1] = -1e-3
+    coloured = {"type": "gridvolume", "grid": mi.VolumeGrid(np.full((2, 2, 2, 3), 0.5, dtype=np.float32))}
+    thin = mi.ScalarTransform4f().translate(LOW.tolist()).scale([5.0, 7.0, 9.0])
+    small = {"sigma_t": rough()["sigma_t"] | {"to_world": thin}}
+    cases = [
+        (rough(values=wrong), "densities below 0 or not finite"),
+        (rough(values=np.where(wrong < 0, np.nan, wrong)), "densities below 0 or not finite"),
+        (rough(values=0 * ROUGH), "is 0 everywhere"),
+        (rough() | {"sigma_t": 0.3}, "without a grid as its extinction"),
+        (rough() | {"sigma_t": coloured}, "a grid of 3 channels"),
+        (rough() | {"albedo": rough()["sigma_t"]}, "without one albedo everywhere"),
+        (rough() | small, "does not cover the shape"),
+    ]
+    for medium, words in cases:
+        with pytest.raises(InputError, match=words) as refusal:
+            clouds_of(medium)
+        assert "the medium of shape 'box'" in str(refusal.value)
+        assert "\n" not in str(refusal.value)

@@ -21,6 +21,7 @@ from reference.monte_carlo.single_scatter.distance_sampling import (
     equi_angular_pdf,
     mixture_of,
     sample_distance,
+    sample_stretch,
 )
 
 SPANS = {  # height, start, length, extinctions
@@ -174,3 +175,17 @@ def test_spots_cone_is_covered(variant):
         if cutoff_degrees < 90:  # and the ends are not much too generous
             sampled = (s >= low[:, None]) & (s <= high[:, None])
             assert np.sum(sampled & ~inside) < 0.02 * inside.sum() + 5
+
+
+@pytest.mark.claim("sampled-distances")
+def test_sampled_distances_have_their_density(variant):
+    """The mean of 1/density over the samples is the length; the density is below 1/(2 length) nowhere."""
+    count = 4096
+    u = mi.Float((np.arange(count) + 0.5) / count)
+    for sigma_t in ([0.0], [1.3], [0.2, 3.0, 40.0]):
+        y, density = (np.array(part, dtype=np.float64) for part in sample_stretch(u, mi.Float(1.7), sigma_t))
+        assert np.all((y >= 0) & (y <= 1.7000001))
+        assert density.min() >= 0.5 / 1.7 * (1 - 1e-6)
+        # The midpoint rule in u, whose integrand has a jump between the techniques: 1/count.
+        assert np.mean(1 / density) == pytest.approx(1.7, rel=2e-3)
+        assert np.mean(y**2 / density) == pytest.approx(1.7**3 / 3, rel=2e-3)
