@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bounded media under a directional light, and their airlight by a plain sum."""
+"""Bounded media under a directional light."""
 
 from typing import Any
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.scene.camera import ray_directions
-from tests.helpers import airlight_sum
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from validation.scenes.meshes import box, placed, rotation
 from validation.scenes.parts import medium_boundary
@@ -68,29 +67,3 @@ def rays(scene) -> tuple[Array, Array]:
     camera = scene.camera
     direction, _ = ray_directions(camera, dr.arange(mi.UInt32, camera.width * camera.height))
     return np.array(camera.origin, dtype=float).ravel(), np.array(direction, dtype=float).T
-
-
-def box_part(centre=CUBE_AT, sides=SIDES, sigma_t=1.1, g=0.4, turn=TURN) -> airlight_sum.Body:
-    chord = airlight_sum.box(centre, 0.5 * np.asarray(sides), turn)
-    return airlight_sum.Body(chord, np.full(3, sigma_t), np.array([0.2, 0.5, 0.9]), airlight_sum.henyey_greenstein(g))
-
-
-def plank_part() -> airlight_sum.Body:
-    return box_part(PLANK_AT, PLANK_SIDES, 1.7, 0.0)
-
-
-def sphere_part(centre=SPHERE_AT, radius=SPHERE_RADIUS) -> airlight_sum.Body:
-    chord, isotropic = airlight_sum.ball(centre, radius), airlight_sum.henyey_greenstein(0.0)
-    return airlight_sum.Body(chord, np.array([0.9, 0.5, 0.7]), np.array([0.9, 0.4, 0.3]), isotropic)
-
-
-def summed(scene, parts, *, along=ALONG, steps=10_000, distance=None, lit=None) -> Array:
-    """Sum the airlight of a directional light over small steps of every chord; `scene` is for its camera."""
-    light = airlight_sum.Light(-unit(along), 0.0, np.array([3.0, 2.0, 1.0]))
-    origin, directions = rays(scene)
-    ends = np.full(len(directions), np.inf) if distance is None else distance.ravel()
-    image = [
-        airlight_sum.airlight_sum(origin, direction, light, parts, steps=steps, end=end, lit=lit)
-        for direction, end in zip(directions, ends, strict=True)
-    ]
-    return np.array(image).reshape(scene.camera.height, scene.camera.width, 3)

@@ -5,7 +5,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.image_filters import Guide, Raster, bilateral, bilateral_of_levels, depth_guide, separable, tile_average
+from realtime.image_filters import (
+    Guide,
+    Raster,
+    bilateral,
+    bilateral_of_levels,
+    depth_guide,
+    separable,
+    small_pixels,
+    tile_average,
+    upsample,
+)
 
 
 def slow_bilateral(image, *, hd, guides=(), support=3.0):
@@ -131,3 +141,52 @@ def test_a_width_by_pixel_counts_the_taps_of_each_pixel(variant):
     for hd in (0.8, 2.5):
         wanted = slow_bilateral(row[None], hd=hd)[0]
         np.testing.assert_allclose(varying[widths == hd], wanted[widths == hd], atol=1e-6)
+
+
+# Up-sampling: bilinear on a surface, the nearest depth elsewhere -----------------------------------------------------
+
+
+COLUMNS, ROWS = 24, 16
+
+
+def upsampled(image, depth, scale):
+    """Take every `scale`-th pixel of an image and interpolate them again."""
+    large, small = Raster(COLUMNS, ROWS), Raster(COLUMNS // scale, ROWS // scale)
+    pixel = np.array(small_pixels(small, scale, COLUMNS))
+    guide = depth_guide(mi.Float(depth.ravel()), 0.1)
+    small_guide = Guide(mi.Float(np.array(guide.values)[pixel]), guide.width)
+    column, row = large.places()
+    lanes = upsample(
+        mi.Float(image.ravel()[pixel]), small_guide, guide.values, small, scale=scale, column=column, row=row
+    )
+    return np.array(lanes).reshape(ROWS, COLUMNS)
+
+
+@pytest.mark.parametrize("scale", [2, 4])
+def test_a_plane_is_interpolated(variant, scale):
+    row, column = np.mgrid[:ROWS, :COLUMNS]
+    image = 0.3 + 0.1 * column - 0.05 * row
+    inner = slice(scale, -scale), slice(scale, -scale)
+    result = upsampled(image, np.full(image.shape, np.inf), scale)
+    np.testing.assert_allclose(result[inner], image[inner], atol=2e-6)
+
+
+@pytest.mark.claim("filters-do-not-leak", tolerance="1e-3 across a doubling of the depth")
+@pytest.mark.parametrize("scale", [1, 2, 4])
+def test_upsampling_leaks_nothing_across_a_depth_edge(variant, scale):
+    depth = np.where(np.arange(COLUMNS) < 11, 2.0, 4.0) * np.ones((ROWS, 1))
+    image = np.where(depth < 3, 0.0, 1.0)
+    np.testing.assert_allclose(upsampled(image, depth, scale), image, atol=1e-3)
+
+
+def test_a_thin_bar_takes_the_nearest_depth(variant):
+    """A bar of one pixel between columns 6 and 10 of the small image, which are 4 and 2.5 m away."""
+    depth, image = np.full((ROWS, COLUMNS), 4.0), np.ones((ROWS, COLUMNS))
+    depth[:, 9:], image[:, 9:] = 2.5, 0.5
+    depth[:, 8] = 1.0
+    assert upsampled(image, depth, 4)[8, 8] == pytest.approx(0.5)
+
+
+def test_upsampling_gives_numbers_for_sky_and_zero_depth(variant):
+    depth = np.random.default_rng(2).choice([0.0, np.inf, np.nan, 2.0], (ROWS, COLUMNS))
+    assert np.all(np.isfinite(upsampled(np.random.default_rng(3).uniform(size=depth.shape), depth, 2)))

@@ -15,9 +15,7 @@ from realtime.export.text import BUILT_IN, CONFORMING, kernel_text
 from realtime.kernels.exact import exact
 from realtime.kernels.quadrature import quadrature
 from realtime.methods.shader.client import ShaderHost
-from realtime.numerics.functions import unit_nodes
-from realtime.scene.phase import HenyeyGreenstein, named_phase
-from realtime.scene.rule_reach import PANEL_DEPTH
+from realtime.scene.phase import named_phase
 from reports.api.export import MEASURED
 from reports.machine.driver_check import certified_rays, exported_values
 from tests.helpers.exported import KERNELS, PHASES, measured
@@ -101,18 +99,6 @@ def test_texts_call_only_built_in_functions_that_round_as_they_should(kernel, ph
     assert called - {"if", "for", "return", "defined"} <= set(BUILT_IN)
 
 
-@pytest.mark.parametrize("legacy", [False, "1.13"])  # colour-science sets the second for all
-def test_constants_are_those_of_the_kernels(legacy):
-    with np.printoptions(legacy=legacy):
-        code = kernel_text("exact", HenyeyGreenstein(None), "glsl")
-    for name, at in (("AL_X", 0), ("AL_W", 1)):
-        words = re.search(rf"{name}\[8\] = float\[8\]\((.*)\);", code).group(1)
-        assert [np.float32(word) for word in words.split(", ")] == [np.float32(node[at]) for node in unit_nodes(8)]
-    for reach in HenyeyGreenstein.reaches():
-        assert f"widest = {reach.panel};" in code
-    assert f"width / {PANEL_DEPTH})" in code
-
-
 @pytest.mark.parametrize("language", ["glsl", "glsl es", "hlsl"])
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_glslang_compiles_what_is_exported(tmp_path, kernel, language):
@@ -140,14 +126,6 @@ def test_wgpu_compiles_what_is_exported():
     device = wgpu.gpu.request_adapter_sync().request_device_sync()
     for kernel, phase in ALL:
         device.create_shader_module(code=airlight.export(kernel, language="wgsl", phase=phase, test=True).code)
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_a_file_says_which_version_made_it(tmp_path, language):
-    path = tmp_path / f"fog.{language}"
-    airlight.export("quadrature-8", language=language, output=path)
-    assert f"airlight {airlight.__version__}" in path.read_text()
-    assert "not measured for this kernel" in path.read_text()
 
 
 @pytest.mark.parametrize(

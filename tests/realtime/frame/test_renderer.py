@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame's airlight is the integral of the reference; marching converges to it, and shadow maps to shadow rays."""
+"""A frame's airlight is the integral of the reference; marching, maps and several rays a pixel converge."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
+from realtime.errors import InputError
+from realtime.frame.renderer import render_frame
+from realtime.frame.samples import render_samples
+from realtime.methods.registry import FOG_METHODS
+from realtime.scene.read_scene import read_scene
+from tests.helpers import frames
 from tests.helpers.frames import frame, reference_of, relative_rmse
 from tests.helpers.scenes import spot, tiny_scene
+from validation.estimates.quadrature import reference_image
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 SCENES = {
     "grey": dict,
@@ -76,3 +87,77 @@ def test_shadow_map_converges_to_shadow_rays(variant):
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 2e-3
     assert render("ray-march", scene=scene, shadow="none").airlight.sum() > rays.sum()
+
+
+# Several rays a pixel ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["shadow-planes", "froxel-fog"])
+def test_one_ray_is_the_frame_itself(variant, method):
+    renderer = prepared(read_scene(load_scene("sphere-spot", (16, 12)).scene), configuration(method))
+    np.testing.assert_array_equal(render_samples(renderer, 1).airlight, render_frame(renderer).airlight)
+
+
+@pytest.mark.claim("anti-aliased")
+def test_the_mean_converges_to_that_over_the_pixels(variant):
+    """16 rays err a quarter as much as the centre alone, by the quadrature of the means over pixels."""
+    loaded = load_scene("sphere-spot", (16, 12))
+    reference = reference_image(loaded.scene, pixel="area").airlight
+    renderer = prepared(read_scene(loaded.scene), configuration("shadow-planes"))
+    shares = []
+
+    def error(samples):
+        frame = render_samples(renderer, samples, shares.append)
+        return np.sqrt(np.mean((frame.airlight - reference) ** 2)) / reference.mean()
+
+    assert error(16) < error(1) / 4
+    assert shares == [number / 16 for number in range(1, 17)]
+
+
+# Lights on rays, by their distance -----------------------------------------------------------------------------------
+
+
+def render_along(method, *, position, size=(9, 9), changes=None, **parameters):
+    """Render a scene whose camera looks along +y, its middle pixel along the axis."""
+    scene = tiny_scene(size=size, floor=None)
+    scene["sensor"]["to_world"] = mi.ScalarTransform4f().look_at([0, -5, 1], [0, 0, 1], [0, 0, 1])
+    scene["lamp"]["position"] = position
+    scene |= {"ball": {"type": "cube", "to_world": mi.ScalarTransform4f().translate([2, 3, 0]).scale(0.3)}} | (
+        changes or {}
+    )
+    return frames.render(scene, method, **parameters)
+
+
+@pytest.mark.claim("light-on-a-ray-refused")
+@pytest.mark.parametrize("method", FOG_METHODS)
+@pytest.mark.parametrize("position", [[0.0, -5.0, 1.0], [0.0, 0.0, 1.0], [1e-8, 0.0, 1.0]])
+def test_a_light_at_the_camera_or_on_a_ray_is_refused_by_its_distance(variant, method, position):
+    with pytest.raises(InputError, match=r"light 1 is [\d.e-]+ m from the (camera|ray .* column 4 of row 4)"):
+        render_along(method, position=position)
+
+
+@pytest.mark.parametrize("position", [[0.0, -9.0, 1.0], [0.0, 9.0, 1.0], [1e-4, 0.0, 1.0], [0.0, -4.999, 1.03]])
+def test_a_light_on_the_line_of_a_ray_but_not_on_it_is_rendered(variant, position):
+    """Behind the camera, behind a wall, a little aside."""
+    wall = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0, 4, 1]).scale(0.5)}
+    frame = render_along("unshadowed", position=position, changes={"wall": wall})
+    assert np.isfinite(frame.airlight).all()
+    assert frame.airlight[4, 4].min() > 0
+
+
+@pytest.mark.parametrize(
+    ("method", "parameters"),
+    [
+        ("ray-march", {}),
+        ("ray-march", {"sum": "transitions"}),
+        ("soft-shafts", {"spacing": "equiangular", "steps": 100, "filter": "none"}),
+    ],
+)
+def test_a_ray_straight_away_from_a_light_has_its_airlight(variant, method, parameters):
+    """All angles at the light are 90 degrees there, and equal steps in them had no length."""
+    J, _ = quad(lambda x: np.exp(-0.31 * (2 * x + 4)) / (x + 4) ** 2, 0, np.inf)
+    wanted = J * 0.31 * np.array([0.9 * 5, 0.8 * 4, 0.7 * 3]) / (4 * np.pi)
+    for away in (0.0, 1e-7, 1e-4):
+        found = render_along(method, position=[away, -9.0, 1.0], **parameters).airlight[4, 4]
+        # Both ends of an angle of 1/1024 are rounded to 2^-24: 1.2e-4, and as much for the places of its steps.
+        np.testing.assert_allclose(found, wanted, rtol=3e-4)

@@ -3,25 +3,30 @@
 
 from itertools import pairwise
 
+import drjit as dr
 import numpy as np
 import pytest
 
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction
-from realtime.kernels.exact import exact
+from realtime.kernels.exact import exact, panels_mean, path_interval
 from realtime.kernels.registry import KERNELS
 from realtime.numerics.array_types import aligned_array, array_types
 from realtime.rays import RayGeometry, ray_geometry
 from realtime.scene.lights import Light, spot_fields
 from realtime.scene.media.medium import Homogeneous
+from realtime.scene.rule_reach import PANEL_NODES
 from tests.helpers.kernel_values import (
     kernel_values,
     opaque,
     phase_of,
     relative_error,
     single_precision,
+    take,
     true_values,
 )
+from validation.kernels.case_files import read_cases
+from validation.kernels.cases import integrate_cases
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -152,3 +157,97 @@ def test_unbounded_rays_that_stay_in_the_beam_of_a_soft_spot(name):
     known = {"exact": 1e-5, "quadrature": 1e-4, "quadrature-theta": 1e-2, "equiangular": 0.1}
     if name in known:
         assert value == pytest.approx(true_values((foot, height, 0.0, np.inf, 0.3)), rel=known[name])
+
+
+#: Rounding left aside, the rule leaves 5e-7, 8e-7 of cos^64; it was tuned on other rays.
+LEFT = 1e-6
+
+
+@pytest.mark.claim("exact-panels")
+@pytest.mark.parametrize("name", NAMES)
+def test_what_the_rule_of_panels_leaves_without_rounding(name):
+    """By the rule for float32, but in float64, and by five times as many nodes."""
+    types = array_types("double")
+    columns = [aligned_array(types.scalar, column) for column in many_rays(20_000, 7)]
+    foot, height, x0, x1, sigma_t = columns
+    phase = phase_of(name, g_of(name, 20_000), types.scalar)
+    scale, tail = phase.lobe_scales(types.scalar)
+    h, e0, e1, _ = path_interval(RayGeometry(foot, height), x0, x1, sigma_t, tail=tail)
+    # Cut where float32 cuts: this is about nodes.
+    e1 = dr.minimum(e1, e0 + dr.minimum(20 / (sigma_t * h), 1e7 * (tail + e0)))
+    f0 = e0 / scale
+    width = dr.maximum(dr.asinh(e1 / scale) - dr.asinh(f0), 0)
+    parts = (phase, (f0, dr.sqrt(f0 * f0 + 1)), scale, width, [sigma_t * h], None)
+    rule, reference = (np.array(panels_mean(*parts, nodes=nodes)[0]) for nodes in (PANEL_NODES, 40))
+    long_enough = np.array(width) > 1e-6  # the difference of two asinh has lost shorter ones
+    assert np.abs(rule[long_enough] / reference[long_enough] - 1).max() < LEFT
+
+
+# Certified values, in both precisions --------------------------------------------------------------------------------
+
+
+FEET, RAYS, DROPLETS = (f"airlight_integral{name}.csv" for name in ("", "_rays", "_droplets"))
+LOBES = ("rayleigh", "hazy", "murky", "hg")
+
+
+@pytest.fixture(scope="module", params=[FEET, RAYS])
+def cases(request, data_folder):
+    return read_cases(data_folder / request.param)
+
+
+@pytest.fixture(scope="module")
+def feet(data_folder):
+    return read_cases(data_folder / FEET)
+
+
+def of_phases(cases, *names):
+    return take(cases, np.isin(cases.phase, names))
+
+
+def certified_errors(cases, kernel, precision):
+    values = integrate_cases(cases, kernel, precision)
+    assert np.all(np.isfinite(values))
+    assert np.all(values >= 0)
+    return relative_error(values, cases.value)
+
+
+@pytest.mark.claim("exact-keeps-its-bar", tolerance="3e-5, 1e-4 where |g| > 0.9; 99 % 3e-6, median 3e-7")
+@pytest.mark.claim("exact-in-float32", tolerance="4e-6 and 1.5e-5 relative, the figures stated")
+def test_exact_in_single_precision(variant, cases):
+    error = certified_errors(cases, "exact", "single")
+    sharp = np.abs(cases.g) > 0.9
+    assert error[~sharp].max() < 3e-5
+    assert error[sharp].max() < 1e-4
+    assert np.percentile(error, 99) < 3e-6
+    assert np.median(error) < 3e-7
+    # What README and the limits state for each of the files.
+    assert error.max() < (1.5e-5 if cases.origin is not None else 4e-6)
+
+
+@pytest.mark.claim("exact-keeps-its-bar", tolerance="1e-10 relative")
+def test_exact_in_double_precision(variant, cases):
+    assert certified_errors(cases, "exact", "double").max() < 1e-10
+
+
+# Sixteen nodes leave 4e-6 of isotropic light, as the double precision shows; float32 adds the rounding of the
+# exponent, 6e-8 times an optical depth of up to 100. Lobes of g up to 0.98 are wider than sixteen nodes resolve.
+@pytest.mark.claim("quadrature-kernel")
+@pytest.mark.parametrize(
+    ("kernel", "precision", "phases", "bound"),
+    [
+        ("quadrature", "single", ["isotropic"], 6e-6),
+        ("quadrature", "double", ["isotropic"], 6e-6),
+        ("quadrature-32", "double", ["isotropic"], 1e-11),
+        ("quadrature", "single", LOBES, 2e-3),
+        pytest.param("quadrature-64", "double", LOBES, 1e-9, marks=pytest.mark.slow),
+    ],
+)
+def test_quadrature(variant, feet, kernel, precision, phases, bound):
+    assert certified_errors(of_phases(feet, *phases), kernel, precision).max() < bound
+
+
+@pytest.mark.claim("droplets-kernels", tolerance="1e-5 in float32, 1e-7 in float64")
+@pytest.mark.parametrize(("precision", "allowed"), [("single", 1e-5), ("double", 1e-7)])
+def test_exact_in_fog_of_droplets(variant, data_folder, precision, allowed):
+    cases = read_cases(data_folder / DROPLETS)
+    assert integrate_cases(cases, "exact", precision) == pytest.approx(cases.value, rel=allowed)

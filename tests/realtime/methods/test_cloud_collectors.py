@@ -15,7 +15,7 @@ from realtime.numerics.array_types import array_types
 from realtime.scene.camera import ray_directions
 from realtime.scene.phase import HenyeyGreenstein
 from realtime.scene.read_scene import read_scene
-from tests.helpers.clouds import DROPLETS, cloud, cloud_scene, ring
+from tests.helpers.clouds import DROPLETS, cloud, cloud_of, cloud_scene, ring
 from tests.helpers.transport_formula import WEIGHTS, Formula, slabs_as_they_are, use_formula
 from validation.scenes.meshes import box, placed, rotation
 from validation.scenes.parts import camera
@@ -73,17 +73,20 @@ def _rays(scene, precision="single"):
     return np.array(camera.origin, dtype=float).ravel(), directions.reshape(camera.height, camera.width, 3)
 
 
+def _transported(directions, depth):
+    """Return the light of a sun of irradiance 1 that the transport says, at a depth below the lit face of the slab."""
+    normal, horizontal = np.asarray(TURN)[:, 2], np.asarray(TURN) @ (0.8, 0.6, 0.0)
+    angles = (-directions @ axis for axis in (normal, horizontal, np.cross(normal, horizontal)))
+    return sum(WEIGHTS) * Formula.radiance(EXTINCTION * THICKNESS, EXTINCTION * depth, *angles, 0.8)
+
+
 def test_a_slab_sends_back_what_the_transport_says(variant):
     """All angles, lengths and sums over sets, colours and irradiance of the sun."""
     scene = _scene()
     image = _airlight(scene, settled=0.02, iterations=30)
     _, directions = _rays(scene)
-    normal, horizontal = np.asarray(TURN)[:, 2], np.asarray(TURN) @ (0.8, 0.6, 0.0)
-    beside = np.cross(normal, horizontal)
-    expected = sum(WEIGHTS) * Formula.radiance(
-        EXTINCTION * THICKNESS, 0, -directions @ normal, -directions @ horizontal, -directions @ beside, 0.8
-    )
-    shown = directions @ normal < -0.3  # rays that come down on the slab, far from its sides
+    expected = _transported(directions, 0)
+    shown = directions @ np.asarray(TURN)[:, 2] < -0.3  # rays that come down on the slab, far from its sides
     assert shown.mean() > 0.3
     for channel, irradiance in enumerate((3.1, 2.9, 2.3)):
         np.testing.assert_allclose(image[shown][:, channel], irradiance * expected[shown], rtol=4e-3)
@@ -121,29 +124,14 @@ def test_the_peak_lowers_the_density(variant):
 def test_a_camera_in_the_cloud_is_its_point(variant):
     """The transport is asked for the depth of the camera below the lit face, in all directions."""
     depth = 51.3
-    normal = np.asarray(TURN)[:, 2]
-    inside = MIDDLE + (0.5 * THICKNESS - depth) * normal
-    medium = {"type": "homogeneous", "id": "fog", **{k: v for k, v in DROPLETS.items() if k != "type"}}
-
-    held = mi.load_dict(medium)
-    from tests.helpers.clouds import cloud_of
-
+    inside = MIDDLE + (0.5 * THICKNESS - depth) * np.asarray(TURN)[:, 2]
+    held = mi.load_dict(DROPLETS | {"sigma_t": EXTINCTION})
     slab = cloud_of("slab", placed(box((2500.0, 2500.0, THICKNESS)), tuple(MIDDLE), TURN), held)
     scene = cloud_scene((16, 12), origin=tuple(inside), sun=_sun(ALONG), slab=slab)
     scene["sensor"]["medium"] = held
     image = _airlight(scene, settled=0.02, iterations=40)
     _, directions = _rays(scene)
-    horizontal = np.asarray(TURN) @ (0.8, 0.6, 0.0)
-    beside = np.cross(normal, horizontal)
-    expected = sum(WEIGHTS) * Formula.radiance(
-        EXTINCTION * THICKNESS,
-        EXTINCTION * depth,
-        -directions @ normal,
-        -directions @ horizontal,
-        -directions @ beside,
-        0.8,
-    )
-    np.testing.assert_allclose(image[..., 0], 3.1 * expected, rtol=4e-3)
+    np.testing.assert_allclose(image[..., 0], 3.1 * _transported(directions, depth), rtol=4e-3)
 
 
 @pytest.mark.claim("collector-frames", tolerance="2e-3 of the mean")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A method that asks for most of the interface, `tests.helpers.veil`, through the door of the built-in ones."""
+"""A method and a medium that ask for most of the interface, or write no more than they must."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -13,8 +14,10 @@ from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame, render_frame
 from realtime.methods.interface.method import Layers
 from realtime.scene.animate import coloured_light
+from realtime.scene.media.medium import Medium
 from realtime.scene.read_scene import read_scene
-from tests.helpers.scenes import tiny_scene
+from tests.helpers.frames import read, relative_rmse, render
+from tests.helpers.scenes import spot, tiny_scene
 from tests.helpers.veil import Veil
 from validation.study.configuration import configuration, prepared
 
@@ -75,3 +78,42 @@ def test_a_method_that_casts_no_rays_and_asks_for_one_is_told_so(scene):
 
     with pytest.raises(InputError, match="the method says that it casts no rays"):
         frame(scene, Asks)
+
+
+# A medium of two functions -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Fog(Medium):
+    """Homogeneous fog that says no more than it must."""
+
+    sigma_t: Any  #: [1/m]
+    albedo: Any
+    phase: Any
+    channels = 1
+    vacuum = False
+
+    def extinction(self, rays, x):
+        return (self.sigma_t,)
+
+    def optical_depth(self, rays, x0, x1):
+        return (self.sigma_t * (x1 - x0),)
+
+    def length_of(self, depth):
+        return depth / self.sigma_t
+
+    def thicker(self, factor):
+        return replace(self, sigma_t=factor * self.sigma_t)
+
+
+@pytest.mark.parametrize("method", ["shadow-planes", "light-volumes", "ray-march", "froxel-fog", "soft-shafts"])
+def test_a_medium_of_two_functions(variant, method):
+    """16 nodes in w on each side of the foot, against the kernel; depths by segments, against one product."""
+    place = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.3)
+    box = {"type": "cube", "to_world": place, "bsdf": {"type": "diffuse"}}
+    scene = read(tiny_scene(lamp=spot(beam=21.0), ball=box), "double")
+    own = scene.medium
+    media = own, Fog(own.sigma_t[0], own.albedo, own.phase)
+    homogeneous, fog = (render(replace(scene, medium=medium), method) for medium in media)
+    assert relative_rmse(fog.airlight, homogeneous.airlight) < 1e-7
+    assert fog.surface == pytest.approx(homogeneous.surface, rel=1e-9)

@@ -1,23 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where nothing casts a shadow a method is prepared as anywhere else.
-
-Its kernels do not grow with the points of an area light, and its airlight is the sum over these points.
-"""
+"""Where nothing casts a shadow a method is prepared as anywhere else, and what a scene does not need costs nothing."""
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
+from realtime.frame.renderer import frame_renderer, run_cast_and_shade, run_method, run_stages
 from realtime.kernels.exact import exact
 from realtime.methods.registry import FOG_METHODS, METHODS
-from realtime.methods.user_method import user_method
-from realtime.scene.camera import ray_directions
-from realtime.scene.light_samples import with_light_samples
 from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import lamp
 from tests.helpers.scenes import tiny_scene
+from validation.scenes.loading import load_scene
+from validation.study.configuration import Configuration, prepared
 
 #: How methods that march resolve this light.
 SETTINGS = {
@@ -50,41 +46,36 @@ def rendered(scene, method, points):
     return image, max(kernel["operation_count"] for kernel in kernels)
 
 
-def sum_over_points(scene):
-    """Return the airlight of the points by a hundred Gauss-Legendre nodes in the angle at each, for unbounded rays."""
-    lit = with_light_samples(scene, POINTS, "sobol")
-    pixel = dr.arange(type(dr.zeros(dr.uint32_array_t(lit.camera.origin.x))), 16 * 12)
-    direction = np.array(ray_directions(lit.camera, pixel)[0], dtype=np.float64).T
-    origin = np.array(lit.camera.origin, dtype=np.float64).ravel()
-    sigma, nodes, weights = 0.31, *np.polynomial.legendre.leggauss(100)
-    total = np.zeros((len(direction), 3))
-    for light in lit.lights:
-        place, normal = (np.array(value, dtype=np.float64).ravel() for value in (light.position, light.normal))
-        foot = direction @ (place - origin)
-        height = np.linalg.norm(place - origin - foot[:, None] * direction, axis=1)
-        begin = np.arctan2(-foot, height)
-        theta = begin[:, None] + 0.5 * (0.5 * np.pi - begin[:, None]) * (1 + nodes)
-        x = foot[:, None] + height[:, None] * np.tan(theta)
-        r = height[:, None] / np.cos(theta)
-        away = origin + x[..., None] * direction[:, None] - place
-        value = np.exp(-sigma * (x + r)) * np.maximum(away @ normal, 0) / r
-        J = value @ weights * 0.5 * (0.5 * np.pi - begin) / height
-        total += J[:, None] * np.array(light.intensity, dtype=np.float64).ravel()
-    return (total * sigma * np.array([0.9, 0.8, 0.7]) / (4 * np.pi)).reshape(12, 16, 3)
-
-
 @pytest.mark.parametrize("name", FOG_METHODS)
 def test_kernels_do_not_grow_with_the_points_of_a_light(empty, name):
     """Up to 4096 points were unrolled where a table of them was missing."""
     (image, few), (_, many) = (rendered(empty, METHODS[name], points) for points in (POINTS, 16))
     assert many == few
-    error = np.abs(image / sum_over_points(empty) - 1)
-    # The nodes and the steps meet a kink where a ray enters the half-space of a point: (1/60)^2 of an interval.
+    error = np.abs(image / rendered(empty, METHODS["unshadowed"], POINTS)[0] - 1)
+    # The steps meet a kink where a ray enters the half-space of a point: (1/60)^2 of an interval.
     # A froxel next to the lamp is as bright as its middle; half of all rays are as right as their slices.
     assert np.median(error) < 2e-3 if name == "froxel-fog" else np.max(error) < 3e-4
 
 
-def test_a_users_method_is_prepared(empty, tmp_path):
-    path = tmp_path / "prepared.py"
-    path.write_text("def mine(view): return view.prepared\nmine.prepare = lambda scene: lambda scene: 7.0\n")
-    assert (render_frame(frame_renderer(empty, user_method(f"{path}:mine"), points=1)).airlight == 7).all()
+# The same kernels and planes: no time can say it better --------------------------------------------------------------
+
+
+def kernels_of(renderer):
+    """The kernels of a replayed frame: what each is by its hash, and how many lanes it has."""
+    ready = renderer.prepare(renderer.scene)
+    run_stages(renderer, ready)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        run_stages(renderer, ready)
+        return [(kernel["type"], kernel.get("hash"), kernel["size"]) for kernel in dr.kernel_history()]
+
+
+@pytest.mark.claim("without-occluders", "not-needed-costs-nothing")
+def test_without_occluders_shadow_planes_run_the_kernels_of_unshadowed(variant):
+    """The same machine code on the same lanes."""
+    scene = read_scene(load_scene("open-fog", (16, 12)).scene)
+    planes, plain = (prepared(scene, Configuration(method, "exact")) for method in ("shadow-planes", "unshadowed"))
+    recorded = kernels_of(planes)
+    assert recorded
+    # Arrays from NumPy are aligned as Dr.Jit's: the code that loads them would differ with their alignment.
+    assert recorded == kernels_of(plain)

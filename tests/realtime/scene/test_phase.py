@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Phase functions, and droplets, on the side under test are those of the reference, which has them by another route."""
+
 import mitsuba as mi
 import numpy as np
 import pytest
 
+from analytic.droplets import Droplets, Modified, optics
 from analytic.phase import PhaseFunction, phase_from_words
+from realtime.droplets import droplet_series, share_cut
+from realtime.errors import InputError
 from realtime.scene.phase import named_phase
 
 
@@ -47,3 +52,26 @@ def test_droplets_are_those_of_the_analytic_side(variant, words):
         value = np.array(phase.evaluate_half(Float(rounded), Float(up)), dtype=np.float64)
         expected = phase_from_words(words).from_half(rounded, up)
         assert value == pytest.approx(expected, rel=tolerance, abs=1e-12)
+
+
+@pytest.mark.claim("droplets-two-sides", tolerance="1e-7 relative: series of Mie's theory leave out terms of 1e-8")
+@pytest.mark.parametrize("droplets", [pytest.param(Droplets(), marks=pytest.mark.slow), Droplets(2.0, 8.0)])
+def test_two_routes_give_one_phase_function(droplets):
+    series = droplet_series(droplets.effective_radius, droplets.gamma)
+    reference = optics(droplets)
+    angle = np.concatenate([np.linspace(0, np.pi, 901), np.geomspace(1e-5, 0.1, 50)])
+    assert series.values(angle) == pytest.approx(reference.series(np.cos(angle)), rel=1e-7)
+    assert series.efficiency == pytest.approx(reference.q_extinction, rel=1e-10)
+    assert series.extinction_per_droplet * 1e-12 * droplets.number == pytest.approx(reference.extinction, rel=1e-10)
+    assert series.share_below(np.deg2rad(5)) == pytest.approx(reference.share(0, 5), abs=1e-9)
+    assert share_cut(droplets.effective_radius, droplets.gamma) == pytest.approx(Modified(reference).removed, abs=1e-9)
+
+
+@pytest.mark.claim("droplets-refused")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [((1.9,), "effective radius"), ((51.0,), "2 to 50"), ((6.0, 0.0), "gamma"), ((6.0, 2.0, 0.6), "wavelength")],
+)
+def test_impossible_droplets_are_refused(arguments, words):
+    with pytest.raises(InputError, match=words):
+        droplet_series(*arguments)

@@ -1,10 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Scenes are read as they are, plans name what is needed, and rays are those of Mitsuba."""
+
+from types import SimpleNamespace
+
+import drjit as dr
 import mitsuba as mi
+import numpy as np
 import pytest
 
-from realtime.errors import InputError
+from realtime.frame.renderer import render_frame
+from realtime.numerics.array_types import array_types
+from realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
+from validation.scenes.loading import load_scene
+from validation.study.configuration import configuration, prepared
 
 
 def read(**changes):
@@ -40,32 +50,6 @@ def test_plan_names_only_what_is_needed(variant):
     assert not read(spot=spot()).features.soft_spots
 
 
-@pytest.mark.claim("scenes-refused-by-name")
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (lambda fog: {"lamp": None}, "no light"),
-        (lambda fog: {"lamp": None, "sky": {"type": "constant"}}, "light 'sky' of type 'constant'"),
-        (lambda fog: {"fog": fog | {"sigma_t": -1.0}}, "sigma_t is"),
-        (lambda fog: {"fog": fog | {"sigma_t": float("nan")}}, "sigma_t is"),
-        (lambda fog: {"fog": fog | {"albedo": 1.5}}, "albedo is"),
-        (lambda fog: {"ball": {"type": "sphere", "bsdf": {"type": "null"}}}, "transparent"),
-        (lambda fog: {"ball": {"type": "sphere", "interior": {"type": "homogeneous"}}}, "bounds a medium"),
-        (lambda fog: {"spot": spot(cutoff=95.0, beam=90.0)}, "cutoff_angle"),
-        (lambda fog: {"sensor": {"type": "thinlens", "aperture_radius": 0.1}}, "ThinLens"),
-    ],
-)
-def test_refusals_name_what_is_in_the_way(variant, changes, message):
-    with pytest.raises(InputError, match=message):
-        read(**changes(tiny_scene()["fog"]))
-
-
-def test_camera_outside_the_medium_is_refused(variant):
-    sensor = {name: value for name, value in tiny_scene()["sensor"].items() if name != "medium"}
-    with pytest.raises(InputError, match="would be in a vacuum"):
-        read(sensor=sensor)
-
-
 @pytest.mark.claim("glossy-surfaces-noted")
 def test_glossy_surfaces_are_noted(variant):
     notes = read(ball={"type": "sphere", "bsdf": {"type": "roughplastic"}}).features.notes
@@ -79,3 +63,82 @@ def test_a_second_camera_is_noted(variant):
     """The first is used, and anyone who meant the other is told."""
     (note,) = read(other={"type": "perspective", "medium": {"type": "ref", "id": "fog"}}).features.notes
     assert "2 cameras: the first is used" in note
+
+
+# The camera ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")
+@pytest.mark.parametrize(
+    ("size", "axis", "pixels"),
+    [((64, 48), "x", None), ((37, 53), "y", None), ((37, 53), "smaller", (10, 31)), ((64, 48), "smaller", (10, 31))],
+)
+def test_rays_are_those_of_mitsuba(variant, size, axis, pixels):
+    sensor = {
+        "type": "perspective",
+        "fov": 47.0,
+        "fov_axis": axis,
+        "to_world": mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0]),
+        "film": {"type": "hdrfilm", "width": size[0], "height": size[1]},
+    }
+    scene = mi.load_dict({"type": "scene", "sensor": sensor})
+    camera, plugin = sensor_camera(scene, array_types("double"))
+    if pixels is not None:  # of the same picture, and no squares
+        camera, size = resized_camera(camera, *pixels), pixels
+    pixel = np.arange(size[0] * size[1])
+    direction = np.array(ray_directions(camera, mi.UInt32(pixel.astype(np.uint32)))[0])
+    position = mi.Point2f((pixel % size[0] + 0.5) / size[0], (pixel // size[0] + 0.5) / size[1])
+    ray, _ = plugin.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))
+    assert np.max(np.abs(direction - np.array(ray.d))) < 5e-7  # float32 matrices on Mitsuba's side
+    assert np.max(np.abs(np.linalg.norm(direction, axis=0) - 1)) < 1e-14
+
+
+def test_aim_is_kept_to_twice_the_digits(variant):
+    """The aim that a camera of single precision has besides its direction, by NumPy: the angle between them."""
+    matrix = mi.ScalarTransform4f().look_at([1.3, -2.1, 0.7], [0.2, 0.4, 0.9], [0.1, 0.2, 1.0])
+    film = {"type": "hdrfilm", "width": 801, "height": 601}
+    scene = mi.load_dict({"type": "scene", "s": {"type": "perspective", "fov": 63.7, "to_world": matrix, "film": film}})
+    pixel = mi.UInt32(np.arange(0, 801 * 601, 7, dtype=np.uint32))
+    camera = sensor_camera(scene, array_types())[0]
+    direction, aim = (np.array(part, dtype=np.float64).T for part in ray_directions(camera, pixel))
+    forward, left, up = (np.array(axis).ravel() for axis in camera.axes)
+    number = np.arange(0, 801 * 601, 7)
+    exact = forward + (400 - number % 801)[:, None] * left + (300 - number // 801)[:, None] * up
+    exact /= np.linalg.norm(exact, axis=1, keepdims=True)
+    plain, kept = (np.linalg.norm(np.cross(part, exact), axis=1) for part in (direction, aim))
+    assert plain.max() > 2e-8  # what float32 alone leaves
+    assert kept.max() < 1e-13
+
+
+@pytest.mark.parametrize("width", [1, 3, 641, 65535, 1 << 20, (1 << 31) - 1])
+def test_rows_and_columns_are_those_of_a_division(variant, width):
+    """Rationale: the division is one of float64, and wrong by one row where rounding shows.
+
+    Setup: pixels next to the ends of rows, where it would show, up to the last that is allowed, and random ones.
+    """
+
+    most = (1 << 31) - 1
+    generator = np.random.default_rng(7)
+    rows = np.append(generator.integers(0, most // width + 1, 2000), [0, 1, most // width])
+    pixels = np.clip(np.concatenate([rows * width + step for step in (-1, 0, 1)]), 0, most)
+    pixels = np.concatenate([pixels, generator.integers(0, most, 2000), [most]])
+    camera = SimpleNamespace(grid=pixel_grid(width, 3))
+    row, column = row_and_column(camera, mi.UInt32(pixels.astype(np.uint32)))
+    assert np.array_equal(np.array(row), pixels // width)
+    assert np.array_equal(np.array(column), pixels % width)
+
+
+def test_one_kernel_serves_images_of_all_sizes(variant):
+    """Rationale: a kernel that holds the size of an image is compiled anew for each, for half a second and more."""
+    launched = []
+    for size in ((64, 48), (96, 80)):
+        scene = read_scene(load_scene("sphere-spot", size).scene)
+        for method in ("unshadowed", "light-volumes"):
+            renderer = prepared(scene, configuration(method))
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+                dr.kernel_history_clear()
+                render_frame(renderer)
+                kernels = dr.kernel_history((dr.KernelType.JIT,))
+            largest = max(kernels, key=lambda kernel: kernel["operation_count"])
+            launched.append((method, largest["hash"]))
+    assert launched[:2] == launched[2:]

@@ -7,27 +7,46 @@ import pytest
 
 import realtime.clouds.canonical.fit as fit_module
 import realtime.clouds.canonical.transport_grid as grid_module
-import tests.helpers.canonical_errors as errors_module
 from realtime.clouds.canonical import coordinates
 from realtime.clouds.canonical.coordinates import SETS
+from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.fit import _directions, fit_on_device, fit_transport
 from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.numerics.array_types import array_types
-from tests.helpers.canonical_errors import transport_at
 
 PHASE, ALBEDO = HenyeyGreensteinPhase(0.5), 0.95
 SIDES = (11, 7, 5, 13, 5)
 STREAMS, MODES = 8, 8  #: of the computation on both sides: what is tested here is what lies between entries
 
 
+def transport_at(albedo, t, d, mu, phi, mu_l, *, phase=PHASE, streams=STREAMS, modes=MODES):
+    """Return T, c_x, c_y and sigma by set at points of one slab, (4, sets, N)."""
+    how = {"streams": streams, "modes": modes, "nodes": 5, "negligible": 1e-5, "single": False}
+    slabs = DirectionalMoments(phase, albedo, mu, **how)
+    thickness = float(np.max(t))
+    suns, of_point = np.unique(mu_l, return_inverse=True)
+    place = np.arange(d.size)
+    modes = slabs(thickness, suns, list(d))[:, :, :, of_point, place, place]
+    m = np.arange(modes.shape[1])[:, None]
+    cosines, sines = np.cos(m * phi), np.sin(m * phi)
+    twice, once = np.where(m > 0, 2.0, 1.0), np.where(m > 0, 1.0, 0.5)
+    T = (modes[:, :, 0] * cosines * twice).sum(1)
+    x = ((modes[:, :, 1] + modes[:, :, 2]) * cosines * once).sum(1)
+    y = ((modes[:, :, 1] - modes[:, :, 2]) * sines).sum(1)
+    square = (modes[:, :, 3] * cosines * twice).sum(1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = x / T, y / T
+        sigma = np.sqrt(np.maximum(square / T - x * x - y * y, 0.0) / 2)
+    return np.stack([T, -x, -y, sigma])
+
+
 @pytest.fixture(scope="module")
 def transport(tmp_path_factory):
     """Compute with few streams: the grid and what it is compared with err alike; read it from the cache, too."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (grid_module, errors_module):
-            patch.setattr(module, "_STREAMS", ((np.inf, STREAMS),))
-            patch.setattr(module, "_MODES", MODES)
+        patch.setattr(grid_module, "_STREAMS", ((np.inf, STREAMS),))
+        patch.setattr(grid_module, "_MODES", MODES)
         patch.setattr(grid_module, "SIDES", SIDES)
         patch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
         made, cached = (canonical_transport(PHASE, ALBEDO) for _ in range(2))
@@ -53,7 +72,7 @@ def test_at_entries_look_ups_are_the_computation(look_up):
     t = coordinates.thicknesses(SIDES[0])[6]
     d, mu = coordinates.depths(SIDES[1], t)[[1, 3, 5]], np.sin(np.pi * (np.array([2, 3, 10]) / 12 - 0.5))
     mu_l, phi = coordinates.suns(SIDES[2])[1:4], np.array([1, 5, 2]) * np.pi / 4
-    exact = transport_at(PHASE, ALBEDO, t, d, mu, phi, mu_l)
+    exact = transport_at(ALBEDO, np.full(3, t), d, mu, phi, mu_l)
     for number in (0, 4, 7):
         T, c_x, c_y, sigma = values(look_up, number, t, d, mu, phi, mu_l)
         assert pytest.approx(exact[0, number], rel=5e-3) == T

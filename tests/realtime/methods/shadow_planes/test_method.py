@@ -5,7 +5,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from tests.helpers.frames import render
@@ -100,9 +99,3 @@ def test_ambient_light_is_added_by_its_formula(variant):
     depth = 0.31 * np.minimum(without.distance, 1e30)
     expected = 0.23 * np.array([0.9, 0.8, 0.7]) * (1 - np.exp(-depth))[..., None]
     assert with_it.airlight - without.airlight == pytest.approx(expected, rel=1e-5)
-
-
-@pytest.mark.claim("shapes-without-edges-refused")
-def test_shapes_without_triangles_are_refused_by_name(variant):
-    with pytest.raises(InputError, match="shape 'ball' is a sphere"):
-        render(mi.load_dict(tiny_scene()), "shadow-planes")

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A silhouette counts the layers over every direction, of any triangles and any light."""
+"""Silhouettes count the layers over every direction; layers before the camera are counted as triangles say."""
 
 from collections import Counter
 from itertools import pairwise
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from realtime.methods.shadow_planes.silhouettes import silhouette
+from realtime.methods.shadow_planes.plane_table import layers_between, light_basis
+from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
+from realtime.scene.camera import read_camera
 from realtime.scene.mesh_adjacency import make_occluders
+from realtime.scene.read_scene import read_scene
 from tests.helpers.occluders import ALL
+from tests.helpers.scenes import tiny_scene
+from validation.scenes.meshes import grid
 
 LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}
 
@@ -99,3 +105,108 @@ def test_any_triangles_and_any_light(vertices, faces, light, seed):
     assume(len(occluders.triangles))
     assert_is_cycle(silhouette(occluders, np.array(light, dtype=float)))
     assert_counts_layers(occluders, light, seed=seed, count=4)
+
+
+# Layers between light and camera -------------------------------------------------------------------------------------
+
+
+def count_between(occluders, light, camera):
+    """Layers between two points, triangle by triangle: a closed component by its facing or its averted ones."""
+    corner = occluders.vertices[occluders.triangles]
+    edge, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    way = camera - light
+    across = np.cross(way, other)
+    scale = np.sum(edge * across, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        start = light - corner[:, 0]
+        u = np.sum(start * across, axis=1) / scale
+        turned = np.cross(start, edge)
+        v = turned @ way / scale
+        t = np.sum(other * turned, axis=1) / scale
+        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)
+    total = 0
+    for component, closed in enumerate(occluders.closed):
+        mine = hit & (occluders.component == component)
+        facing = int(np.sum(mine & (scale > 0)))
+        total += max(facing, int(mine.sum()) - facing) if closed else int(mine.sum())
+    return total
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), components=st.integers(1, 4))
+def test_layers_between_light_and_camera(seed, components):
+    rng = np.random.default_rng(seed)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    meshes = [
+        ("closed", rng.normal(size=(4, 3)), faces if rng.random() < 0.5 else faces[:, ::-1]) for _ in range(components)
+    ]
+    meshes.append(("open", rng.normal(size=(9, 3)), np.arange(9).reshape(3, 3)))
+    occluders = make_occluders(meshes)
+    used = np.ones(len(occluders.closed), dtype=bool)
+    for _ in range(4):
+        light, camera = rng.normal(size=(2, 3)) * rng.choice([0.3, 1.0, 3.0], (2, 1))
+        basis = light_basis(light, camera)
+        assert layers_between(occluders, light, basis, used=used) == count_between(occluders, light, camera)
+        assert layers_between(occluders, light, basis, used=~used) == 0
+
+
+@pytest.mark.claim("no-ray-slips-through")
+def test_axis_through_edges_and_vertices_counts_each_layer_once():
+    """The axis runs through edges and vertices of a grid: of the triangles there one counts."""
+    occluders = make_occluders([("grid", *grid((-1, -1, 0), (2, 0, 0), (0, 2, 0), (4, 4)))])
+    used = np.ones(1, dtype=bool)
+    for x, y in ((0, 0), (0.5, 0.5), (0.25, 0), (0, 0.25), (0.25, 0.25), (0.1, 0.3)):
+        light, camera = np.array([x, y, 1.0]), np.array([x, y, -1.0])
+        assert layers_between(occluders, light, light_basis(light, camera), used=used) == 1
+
+
+# No occluder is left out whose shadow is seen ------------------------------------------------------------------------
+
+
+def camera_at(origin, target, size=(40, 30)):
+    scene = tiny_scene(size=size, ball=None, floor=None)
+    look = mi.ScalarTransform4f().look_at(list(origin), list(target), [0.1, 0.3, 1])
+    scene["sensor"] = scene["sensor"] | {"to_world": look}
+    return read_camera(read_scene(mi.load_dict(scene)).camera)
+
+
+def sees(camera, points):
+    """Whether points lie in the image: along the ray through a pixel, by projection."""
+    origin, forward, left, up = camera.origin, camera.forward, camera.left, camera.up
+    away = points - origin
+    depth = away @ forward
+    across = away @ left / (left @ left) / np.where(depth > 0, depth, np.inf)
+    upward = away @ up / (up @ up) / np.where(depth > 0, depth, np.inf)
+    return (depth > 0) & (np.abs(across) < camera.width / 2) & (np.abs(upward) < camera.height / 2)
+
+
+def boxes(rng, count):
+    """Boxes of triangles, one a component."""
+    corners = np.array([[i >> k & 1 for k in range(3)] for i in range(8)], dtype=float)
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4]])
+    meshes = []
+    for number in range(count):
+        size, place = rng.uniform(0.1, 1.2, 3), rng.normal(size=3) * 3
+        meshes.append((f"box {number}", corners * size + place, faces))
+    return make_occluders(meshes)
+
+
+@pytest.mark.claim("culled-occluders")
+@pytest.mark.parametrize("w", [1.0, 0.0])
+def test_no_component_is_dropped_whose_shadow_is_seen(variant, w):
+    """From a light with a place, and from one at infinity in this direction."""
+    rng = np.random.default_rng(11)
+    dropped = 0
+    for _ in range(40):
+        occluders = boxes(rng, 8)
+        light, origin, target = rng.normal(size=(3, 3)) * 3
+        camera = camera_at(origin, target)
+        used = components_in_view(occluders, camera, np.append(light, w))
+        for component, (low, high) in enumerate(occluders.boxes):
+            points = rng.uniform(low, high, (4000, 3))
+            beyond = rng.exponential(3, (len(points), 1)) * (rng.random((len(points), 1)) < 0.9)
+            if sees(camera, points + beyond * (w * points - light)).any():
+                assert used[component]
+        dropped += int(np.sum(~used))
+    # A third at least has its shadow elsewhere: the test is worth its time only if there is something to drop.
+    assert dropped > 100

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A shadow map is never read outside; that it says what rays say is seen in frames, `tests/realtime/frame`."""
+"""Shadow maps are never read outside, and a plane never shadows itself; frames show that maps say what rays say."""
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.methods.soft_shafts.march import source_state
+from realtime.scene.light_samples import with_light_samples
 from realtime.scene.read_scene import read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map
+from tests.helpers.lamps import lamp_scene
 from tests.helpers.scenes import spot, tiny_scene
 
 
@@ -20,3 +24,14 @@ def test_a_look_up_stays_in_the_map_whatever_the_point(variant, kind):
     points = np.array(np.meshgrid(odd, odd, odd)).reshape(3, -1)
     place = np.array(light.position).reshape(3, 1)
     assert np.array(lit_in_map(shadow_map, light, mi.Vector3f(np.hstack([points, place + points, place])))).size == 687
+
+
+def test_a_plane_never_shadows_itself(variant):
+    scene = with_light_samples(read_scene(mi.load_dict(lamp_scene(ball=None))), 3, "ring")
+    state = source_state(scene.geometry, list(scene.lights), 64, with_maps=True)
+    points = np.random.default_rng(4).uniform([-5, -5, 0], [5, 5, 0], (50000, 3))
+    place = mi.Vector3f(*(mi.Float(column) for column in points.T))
+    frame = dr.gather(type(state.frames), state.frames, mi.UInt32(1))
+    local = frame.local(place - frame.position)
+    lit = np.array(state.maps.lit_surface(mi.UInt32(1), local))[np.array(local[2]) > 0.1]
+    assert np.all(lit)

@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whatever the boundaries and whenever intervals are added, the sum is that over the lit intervals."""
+"""Whatever the boundaries, and whenever intervals are added, the sum is that over the lit intervals."""
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realtime.intervals import add_waiting, close_interval, no_intervals, open_interval, sum_at_end
+from realtime.intervals import (
+    add_waiting,
+    close_interval,
+    exchange,
+    filled,
+    insert,
+    no_intervals,
+    open_interval,
+    sum_at_end,
+)
 from realtime.numerics.array_types import aligned_array
 
 RAYS, STEPS = 24, 7
@@ -79,3 +88,64 @@ def test_intervals_that_are_added_at_once(variant, layers, places, gains):
         intervals, over = add_waiting(intervals, integral), behind
     intervals = close_interval(intervals, columns[-1], over <= 0)
     check(add_waiting(intervals, integral).total, layers, places, gains)
+
+
+# The queue of the nearest crossings: ties, infinities, too many ------------------------------------------------------
+
+
+QUEUES, COUNT, LENGTH = 16, 9, 4
+# Few values, so that many are equal; 0 and infinity stand for no crossing.
+KEYS = arrays(np.float32, (QUEUES, COUNT), elements=st.sampled_from([0.0, 0.25, 1.5, 1.75, 2.0, 1e30, np.inf]))
+
+
+def in_order(keys):
+    """Places of the keys of every ray, nearest first, those of one key as they came."""
+    return np.argsort(-keys, axis=1, kind="stable")
+
+
+def lanes(keys):
+    return [aligned_array(mi.Float, column) for column in keys.T]
+
+
+def rows(values):
+    """Read arrays; all that a test reads is evaluated together before, in one kernel."""
+    return np.stack([np.array(value) for value in values], axis=1)
+
+
+@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
+@settings(deadline=None, max_examples=50)
+@given(keys=KEYS)
+def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, keys):
+    none = 0.0
+    queue, out = filled(none, LENGTH, mi.Float, QUEUES), []
+    for number, key in enumerate(lanes(keys)):
+        queue, *left = insert(queue, key, mi.Float(number + 1))
+        out.append(left)
+    dr.eval(queue, out)
+    order = in_order(keys)
+    wanted = np.take_along_axis(keys, order, axis=1)
+    kept, gains = rows(queue.key), rows(queue.gain)
+    np.testing.assert_array_equal(kept, wanted[:, :LENGTH])
+    real = kept != none
+    np.testing.assert_array_equal(gains[real], order[:, :LENGTH][real] + 1)
+    # Nothing is lost in secret: what is not in the queue came out.
+    others = np.sort(np.concatenate([rows(queue.key), rows([key for key, _ in out])], axis=1), axis=1)
+    padding = np.full((QUEUES, LENGTH), none, dtype=np.float32)
+    np.testing.assert_array_equal(others, np.sort(np.concatenate([keys, padding], axis=1), axis=1))
+
+
+@pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
+@settings(deadline=None, max_examples=50)
+@given(keys=KEYS, shift=arrays(np.int64, (QUEUES, COUNT), elements=st.integers(0, LENGTH)))
+def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(variant, keys, shift):
+    keys = np.take_along_axis(keys, in_order(keys), axis=1)
+    # Each comes at most LENGTH later than in order, so none waits for more than these.
+    late = np.argsort(np.arange(COUNT) + shift, axis=1, kind="stable")
+    assume((late != np.arange(COUNT)).any())
+    first, last = np.inf, 0.0
+    queue, out = filled(first, LENGTH, mi.Float, QUEUES), []
+    for key in lanes(np.take_along_axis(keys, late, axis=1)) + [mi.Float(last)] * LENGTH:
+        queue, nearest, _ = exchange(queue, key, mi.Float(0))
+        out.append(nearest)
+    dr.eval(out)
+    np.testing.assert_array_equal(rows(out[LENGTH:]), keys)

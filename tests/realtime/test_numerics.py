@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Bounded functions keep the errors that their docstrings state; what is recorded is recorded once, and ends well."""
+
 import gc
 from dataclasses import replace
 
@@ -10,10 +12,37 @@ import pytest
 from realtime.frame.renderer import frame_renderer, run_stages
 from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import METHODS
+from realtime.numerics.array_types import array_types
+from realtime.numerics.functions import WIDEST, exp2_bounded, exp_bounded, exp_expm1_bounded, sinh_bounded
 from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import read_objects, turned_objects
 from realtime.scene.read_scene import read_scene
 from validation.scenes.loading import load_scene
+
+WHOLE = np.append(np.linspace(-87, 88, 1_000_001), np.outer([-1, 1], np.geomspace(1e-30, 1, 10_000)))
+
+
+@pytest.mark.parametrize(
+    ("function", "exact", "x"),
+    [
+        (exp_bounded, np.exp, np.linspace(-87, 88, 2_000_001)),
+        (exp2_bounded, np.exp2, np.linspace(-125, 125, 1_000_001)),
+        (sinh_bounded, np.sinh, np.append(np.linspace(-WIDEST, WIDEST, 100_000), np.geomspace(1e-30, 1, 1000))),
+    ],
+    ids=["exp", "exp2", "sinh"],
+)
+def test_relative_error_over_the_stated_range(variant, function, exact, x):
+    x = x.astype(np.float32)
+    value = np.array(function(mi.Float(x)), dtype=np.float64)
+    np.testing.assert_allclose(value, exact(x.astype(np.float64)), rtol=2e-7)  # stated in the docstrings
+
+
+@pytest.mark.parametrize(("precision", "error"), [("single", 5e-7), ("double", 2e-15)])
+def test_differences_of_exponentials_over_the_stated_range(variant, precision, error):
+    x = WHOLE.astype(np.float32)
+    power, less = np.array(exp_expm1_bounded(array_types(precision).scalar(x)), dtype=np.float64)
+    np.testing.assert_allclose(less, np.expm1(x.astype(np.float64)), rtol=error)
+    np.testing.assert_allclose(power, np.exp(x.astype(np.float64)), rtol=error)
 
 
 @pytest.fixture

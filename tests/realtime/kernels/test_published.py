@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: published kernels are their series, tables and closed forms; they err and differ from the print as derived."""
+
+from functools import partial
+
+import mitsuba as mi
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from analytic.phase import PhaseFunction
+from realtime.kernels.closed_form import closed_form, scaled_e1
+from realtime.kernels.exact import exact
+from realtime.kernels.table import table, table_records
+from realtime.kernels.taylor import PRINTED_PHASES, taylor
+from realtime.numerics.array_types import aligned_array, array_types
+from reference.scene.read import read_reference
+from tests.helpers import frames
+from tests.helpers.frames import relative_rmse
+from tests.helpers.kernel_values import RAY, kernel_values, relative_error, take, true_values
+from tests.helpers.scenes import bounded_medium, clear_scene
+from validation.kernels.case_files import read_cases
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+N = 2147483673
+taylor_printed = partial(taylor, printed=True)
+
+#: What the print has too much, before e^-a and before the division by the mean: DESIGN section 3, printed - derived.
+EXCESS = {
+    ("isotropic", 2): lambda a: (a**2 - a) / 2,
+    ("isotropic", 3): lambda a: -2 * a / 3,
+    ("rayleigh", 2): lambda a: 3 * a / 8,
+    ("hazy", 1): lambda a: np.full_like(a, 9 / 36 + 9 / 32),
+    ("hazy", 2): lambda a: 265 * a**2 / 512,
+    ("murky", 1): lambda a: 2 * N * a / 2**31 - 25 / 367108864 + 25 / 67108864,
+}
+MEANS = {"isotropic": 1.0, "rayleigh": 1.0, "hazy": 2.0, "murky": 83 / 33}
+
+
+def rays_near_the_foot():
+    rng = np.random.default_rng(2)
+    foot, height, sigma_t = rng.uniform(0.3, 3, 200), rng.uniform(0.2, 2, 200), rng.uniform(0, 1, 200)
+    x0 = foot + height * rng.uniform(-1.2, 0.2, 200)
+    return foot, height, x0, x0 + height * rng.uniform(0.01, 1, 200), sigma_t
+
+
+@pytest.mark.claim("series-by-two-routes", tolerance="1e-12 relative")
+@pytest.mark.parametrize("phase", ["isotropic", "rayleigh", "hazy", "murky", "hg"])
+def test_it_is_the_integral_of_the_series(phase):
+    """Against mpmath: its own Taylor series of the integrand, integrated term by term in 30 digits."""
+    g, (t, h, x0, x1, sigma_t) = 0.37, (1.3, 0.7, 0.0, 2.9, 0.43)
+    value = kernel_values(taylor, (t, h, x0, x1, sigma_t), phase, g, precision="double")[0]
+    with mpmath.workdps(30):
+        p = PhaseFunction(phase, g=g if phase == "hg" else 0.0)
+
+        def integrand(theta):
+            return mpmath.exp(-sigma_t * h * (mpmath.sin(theta) + 1) / mpmath.cos(theta)) * p.mp(-mpmath.sin(theta))
+
+        series = mpmath.taylor(integrand, 0, 4)
+        low, high = mpmath.atan2(x0 - t, h), mpmath.atan2(x1 - t, h)
+        total = sum(c * (high ** (n + 1) - low ** (n + 1)) / (n + 1) for n, c in enumerate(series))
+        expected = float(total * mpmath.exp(-sigma_t * t) / h)
+    assert value == pytest.approx(expected, rel=1e-12)  # float64 rounding of a dozen operations
+
+
+@pytest.mark.claim("taylor-near-the-foot")
+def test_it_converges_to_the_integral_near_the_foot():
+    ray = (1.0, 2.0, 0.3, 1.9, 0.3)
+    true = kernel_values(exact, ray, precision="double")[0]
+    errors = [abs(kernel_values(taylor, ray, precision="double", degree=n)[0] / true - 1) for n in (2, 4, 8, 16)]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 1e-7
+    # Far from it degree 4 is wrong by more than the light itself.
+    far = (1.0, 1.0, 8.0, 60.0, 0.3)
+    degree_4, true = (kernel_values(kernel, far, precision="double")[0] for kernel in (taylor, exact))
+    assert abs(degree_4 / true - 1) > 0.1
+
+
+@pytest.mark.parametrize("name", PRINTED_PHASES)
+def test_it_differs_from_taylor_by_the_integral_of_the_misprints(name):
+    rays = foot, height, x0, x1, sigma_t = rays_near_the_foot()
+    a, low, high = sigma_t * height, np.arctan2(x0 - foot, height), np.arctan2(x1 - foot, height)
+    terms = [f(a) * (high ** (n + 1) - low ** (n + 1)) / (n + 1) for (p, n), f in EXCESS.items() if p == name]
+    expected = sum(terms) * np.exp(-sigma_t * foot - a) / height / MEANS[name]
+    printed, derived = (kernel_values(kernel, rays, name, precision="double") for kernel in (taylor_printed, taylor))
+    # differences of numbers of order 1, whose rounding is 1e-16
+    np.testing.assert_allclose(printed - derived, expected, rtol=1e-11, atol=1e-14)
+    assert np.max(np.abs(printed - derived)) > 1e-2
+
+
+# The polynomial in bounded media: what section 4.2 of Biri 2006 means and prints -------------------------------------
+
+
+CENTRE, RADIUS, SIGMA, MEAN = np.array([-0.2, 0.4, 0.7]), 0.6, 0.7, 1.2 * 0.6
+
+
+def render(scene, kernel, **parameters):
+    return frames.render(scene, "shadow-planes", kernel=kernel, precision="double", **parameters).airlight
+
+
+def ball(**phase):
+    shape = {"type": "sphere", "center": CENTRE.tolist(), "radius": RADIUS}
+    return bounded_medium(shape, SIGMA, (0.9, 0.4, 0.3), **phase)
+
+
+def by_hand(scene, exponent, p):
+    """Integrate exp(-exponent(x, r, foot, height, enter)) p/r^2 over every chord by adaptive quadrature."""
+    reference = read_reference(mi.load_dict(scene))
+    light = reference.lights[0]
+    image = np.zeros(len(reference.direction))
+    for pixel, direction in enumerate(reference.direction):
+        toward = CENTRE - reference.origin
+        middle = toward @ direction
+        half = RADIUS**2 - (toward @ toward - middle**2)
+        if half <= 0:
+            continue
+        enter, leave = middle - np.sqrt(half), middle + np.sqrt(half)
+        away = light.position - reference.origin
+        foot = away @ direction
+        height = np.sqrt(away @ away - foot**2)
+
+        def integrand(x, foot=foot, height=height, enter=enter):
+            r = np.hypot(x - foot, height)
+            return np.exp(-exponent(x, r, foot, height, enter)) * p((foot - x) / r) / r**2
+
+        image[pixel] = quad(integrand, enter, leave, epsabs=0, epsrel=1e-11)[0]
+    scale = np.array([0.9, 0.4, 0.3]) * SIGMA * light.intensity / (4 * np.pi)
+    return image.reshape(reference.height, reference.width, 1) * scale
+
+
+def meant(x, r, foot, height, enter):
+    return SIGMA * (x - enter + MEAN)
+
+
+def printed(x, r, foot, height, enter):
+    # (sin theta + 1)/cos theta with theta the angle at the light from the foot.
+    return SIGMA * (foot + MEAN - enter + MEAN * (r + x - foot) / height)
+
+
+@pytest.mark.claim(
+    "polynomial-of-bounded-media", "mean-distance-of-the-paper", tolerance="relative RMSE 1e-4 of nodes and degree 25"
+)
+@pytest.mark.parametrize(("form", "exponent"), [("paper", meant), ("printed", printed)])
+@pytest.mark.parametrize("phase", [pytest.param("isotropic", marks=pytest.mark.slow), "rayleigh"])
+def test_both_forms_are_their_integrals_by_nodes_and_by_a_polynomial(variant, form, exponent, phase):
+    # The chords pass their feet within 45 degrees at the light, where the series converge fast.
+    lamp = clear_scene()["lamp"] | {"position": [-0.1, 0.5, 2.7]}
+    scene = clear_scene(lamp=lamp, ball=ball(phase={"type": phase}))
+    p = {"isotropic": lambda c: 1.0, "rayleigh": lambda c: 0.75 * (1 + c * c)}[phase]
+    expected = by_hand(scene, exponent, p)
+    assert (expected > 0).sum() > 30
+    assert relative_rmse(render(scene, "exact", media=form), expected) < 1e-4
+    assert relative_rmse(render(scene, "taylor-25", media=form), expected) < 1e-4
+    few = relative_rmse(render(scene, "taylor-1", media=form), expected)
+    more = relative_rmse(render(scene, "taylor", media=form), expected)
+    assert 1e-7 < more < 0.2 * few
+
+
+@pytest.mark.claim("polynomial-of-bounded-media")
+def test_a_polynomial_kernel_is_asked_in_bounded_media_and_no_other(variant):
+    scene = clear_scene(ball=ball())
+    exact, asked = render(scene, "exact"), render(scene, "taylor")
+    assert np.array_equal(asked, render(scene, "taylor", media="paper"))
+    assert relative_rmse(asked, exact) > 0.05
+    assert np.array_equal(exact, render(scene, "taylor", media="exact"))
+    assert np.array_equal(exact, render(scene, "quadrature"))
+    wrong = render(scene, "taylor-printed", media="printed")
+    # c_2 of the isotropic function is misprinted: a^2 - a for half of it.
+    assert relative_rmse(wrong, render(scene, "taylor", media="printed")) > 1e-3
+
+
+# The closed form -----------------------------------------------------------------------------------------------------
+
+
+DEGREES = {"isotropic": 0, "rayleigh": 2, "hazy": 8, "murky": 32}
+E1 = {"single": 1e-5, "double": 1e-13}  #: relative error of the exponential integral, as `scaled_e1` states it
+
+
+@pytest.fixture(scope="module", params=DEGREES)
+def cases(request, data_folder):
+    read = read_cases(data_folder / "airlight_integral.csv")
+    return take(read, np.array(read.phase) == request.param)
+
+
+def columns(cases):
+    return cases.foot, cases.height, cases.x0, cases.x1, cases.sigma_t
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_scaled_exponential_integral(precision):
+    """Both regions and their border, against mpmath at the values that the kernel sees; in a vacuum atan(1/e)."""
+    Float = array_types(precision).scalar
+    magnitude = np.concatenate([np.logspace(-6, 3, 40), np.linspace(0.7, 2.4, 60)])
+    e = np.resize([0.0, 0.03, 0.4, 1.0, 2.7, 31.0, 1e3, 1e6], magnitude.size)
+    e, a = aligned_array(Float, e), aligned_array(Float, magnitude / np.hypot(e, 1))
+    real, imaginary = (np.array(part, dtype=np.float64) for part in scaled_e1(e, a))
+    with mpmath.workdps(30):
+        z = [mpmath.mpc(mpmath.mpf(p) * mpmath.mpf(q), -q) for p, q in zip(np.array(e).tolist(), np.array(a).tolist())]
+        expected = [mpmath.exp(value) * mpmath.e1(value) for value in z]
+        assert max(abs(x - s.real) / abs(s) for x, s in zip(real.tolist(), expected)) < E1[precision] / 5
+        assert max(abs(y / s.imag - 1) for y, s in zip(imaginary.tolist(), expected)) < E1[precision]
+    _, vacuum = scaled_e1(e, aligned_array(Float, np.zeros(100)))
+    assert np.array(vacuum) == pytest.approx(np.arctan2(1, np.array(e)), rel=E1[precision])
+
+
+@pytest.mark.claim("closed-form-cancels")
+def test_accuracy_by_tag(cases):
+    """Good for ordinary rays; nothing left in float32 of segments far before the light and of slivers."""
+    tags, name = np.array(cases.tag), cases.phase[0]
+    hard = np.isin(tags, ["beyond", "far", "sliver"])
+    for precision, good, thick in (("single", 2e-4, 2e-3), ("double", 1e-11, 1e-11)):
+        error = relative_error(kernel_values(closed_form, columns(cases), name, precision=precision), cases.value)
+        assert error[~hard & (tags != "thick")].max() < good
+        assert error[tags == "thick"].max() < thick
+        if precision == "single":
+            assert all(error[tags == tag].max() > 0.03 for tag in ("beyond", "far", "sliver"))
+        else:
+            assert error[hard].max() < 1e-7
+
+
+# The table -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [5, 64])
+def test_entries_are_the_integrals(size):
+    values = table_records(size)[:, 0].reshape(size - 1, size - 1)
+    for i, j in ((1, 1), (1, size - 2), (size - 2, size - 2)):
+        p, q = (mpmath.mpf(index) / (size - 1) for index in (i, j))
+        expected = mpmath.quad(
+            lambda xi, p=p: mpmath.exp(-10 * p * mpmath.tan(xi)), [0, q * mpmath.pi / 8, q * mpmath.pi / 2]
+        )
+        assert values[i, j] == pytest.approx(float(expected), rel=1e-12)
+
+
+@pytest.mark.claim("table-edge")
+def test_published_form_reads_the_edge_beyond_its_table(variant):
+    """Beyond u = 10 the value is that of u = 10 times the true prefactor: far too large or small, by what that says."""
+    foot, height, x0, x1, _ = RAY
+    rays = (foot, height, x0, x1, np.array([10, 30]) / height)
+    inside, outside = kernel_values(table, rays, precision="double")
+    assert outside / inside == pytest.approx(np.exp(-(30 - 10) / height * foot), rel=1e-9)
+    assert not 0.1 < outside / true_values(rays)[1] < 10
