@@ -4,7 +4,6 @@
 import inspect
 import math
 import os
-import re
 import subprocess
 import sys
 import time
@@ -16,8 +15,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
-from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.storage import kept as module
@@ -36,11 +33,8 @@ from reference.storage.kept import (
 )
 from reports.machine.driver_check import error_of_device
 from validation.kernels.rays import _reference
-from validation.kernels.stability import stability
-from validation.study.growth import study_growth
-from validation.study.reference import sampled_reference
 from validation.study.run import run
-from validation.study.scene import check_reference, flip, measured, measured_image, multiple_scattering
+from validation.study.scene import check_reference
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 
@@ -228,26 +222,15 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
     assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest(key_of)]
 
 
-def functions():
-    """What computes each kind of what is kept, and a module of which it takes numbers."""
-    quadrature = "reference.quadrature.segments"
-    return {
-        "quadrature": (quadrature_image, quadrature),
-        "single-scatter": (single_scatter_batch, "reference.monte_carlo.single_scatter.distance_sampling"),
-        "volpath": (volpath_batch, "reference.scene.read"),
-        "cloud-paths": (cloud_paths_batch, "reference.monte_carlo.cloud_paths.walk"),
-        "kernel-rays": (_reference, "analytic.panels"),
-        "sweep-reference": (sampled_reference, quadrature),
-        "row": (run, "realtime.methods.ray_march"),
-        "scene-checks": (check_reference, "validation.statistics.comparison"),
-        "scene-multiple": (multiple_scattering, "reference.monte_carlo.volpath.integrator"),
-        "cell": (measured, "realtime.methods.ray_march"),
-        "scene-image": (measured_image, "validation.metrics.errors"),
-        "flip": (flip, "validation.metrics.errors"),
-        "report-stability": (stability, "realtime.kernels.exact"),
-        "report-scaling": (study_growth, "realtime.methods.ray_march"),
-        "shader-driver": (error_of_device, "realtime.export.text"),
-    }
+#: What computes some kinds of what is kept, and a module of which each takes numbers.
+COMPUTED = {
+    "quadrature": (quadrature_image, "reference.quadrature.segments"),
+    "volpath": (volpath_batch, "reference.scene.read"),
+    "kernel-rays": (_reference, "analytic.panels"),
+    "row": (run, "realtime.methods.ray_march"),
+    "scene-checks": (check_reference, "validation.statistics.comparison"),
+    "shader-driver": (error_of_device, "realtime.export.text"),
+}
 
 
 def closure(function):
@@ -262,26 +245,18 @@ def closure(function):
 
 
 @pytest.mark.claim("report-kept")
-def test_every_kind_hangs_on_the_code_that_computes_it_and_not_on_claims_of_papers():
-    for kind, (function, needed) in functions().items():
+def test_what_is_kept_hangs_on_the_code_that_computes_it_and_not_on_claims_of_papers():
+    for kind, (function, needed) in COMPUTED.items():
         names = closure(function)
         assert needed in names, kind
         apart = ("validation.papers", "reports.commands", "reports.papers", "reports.tables")
         assert not [name for name in names if name.startswith(apart)], kind
 
 
-def test_every_kind_that_is_kept_is_in_the_table():
-    """But the experiments of papers, each of which hangs on its module."""
-    text = "".join(path.read_text(encoding="utf-8") for path in module._modules().values())
-    kinds = set(re.findall(r'(?:key_of|@kept)\(\s*"([a-z-]+)"', text))
-    assert kinds - {"report-paper"} <= functions().keys()
-    assert {"quadrature", "kernel-rays", "sweep-reference", "row", "report-scaling"} <= kinds
-
-
 @pytest.mark.claim("report-kept")
 @pytest.mark.parametrize("kind", ["quadrature", "row"])
 def test_a_change_of_the_code_throws_results_away_and_a_comment_does_not(monkeypatch, kind):
-    function, needed = functions()[kind]
+    function, needed = COMPUTED[kind]
     file = module._ROOT.joinpath(*needed.split(".")).with_suffix(".py")
     compiled, source = module._compiled, module._source
     before = key_of(kind, function)
