@@ -32,6 +32,7 @@ from reports.tables.table import Table
 
 if TYPE_CHECKING:
     from reports.data import records
+    from validation.engine.images import EngineImage
 
 FOLDER = "airlight-report"  #: where a report is written by default
 
@@ -249,7 +250,6 @@ def _measured(
     activate()
     from realtime.methods.shader.source import is_users
     from reports.api.render import asked_configurations
-    from reports.report.asked import scenes_of_images
     from reports.report.measure import write_report
     from validation.study.cost import check_work, frame_work, reference_work
     from validation.study.study import RandomScenes, read_study, standard_study
@@ -257,7 +257,7 @@ def _measured(
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):
         study, asked = read_study(Path(asked[0])), []
-    names, shown = scenes_of_images(asked or None, images, tuple(study.scene_names()))
+    names, shown = _scenes_of_images(asked, images, tuple(study.scene_names()))
     chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)
     if methods and all(isinstance(name, str) and is_users(name) for name in methods):
         note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
@@ -283,6 +283,27 @@ def _measured(
             noted=partial(note, progress),
             cluster=None if place is None else stack.enter_context(connected(place)),
         )
+
+
+def _scenes_of_images(
+    asked: Sequence[str], images: Any, usual: Sequence[str]
+) -> "tuple[list[str], dict[str, tuple[EngineImage, ...]]]":
+    """Return the scenes to study and the images by scene, from a folder of images or None.
+
+    Scenes are those `asked` for; without any those of the images, or the `usual` ones without images.
+    """
+    if images is None:
+        return list(asked or usual), {}
+    from validation.engine.images import find_images
+    from validation.scenes.loading import scene_stem
+    from validation.scenes.registry import SCENES
+
+    shown = find_images(images, {scene_stem(name): name for name in [*SCENES, *asked]})
+    names = list(asked or shown)
+    wanted = {scene_stem(name) for name in names}
+    if not wanted & set(shown):
+        raise InputError(f"--images: {images} has no image of {', '.join(sorted(wanted))}, only of {', '.join(shown)}")
+    return names, {name: several for name, several in shown.items() if name in wanted}
 
 
 def _done(report: "records.Report") -> str:

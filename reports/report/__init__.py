@@ -3,7 +3,6 @@
 
 Read in this order:
 
-- `asked.py`: the scenes and images that a report is asked for
 - `scene.py`: the record of a scene, and its files
 - `others.py`: what belongs to no scene: stability, growth, claims of papers
 - `claims.py`: the sentences at the top, from the numbers, and what user methods did wrong

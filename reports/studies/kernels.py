@@ -227,10 +227,11 @@ def integrals(
     Parameters
     ----------
     cases
-        A CSV file with the columns of airlight_integral.csv; x1 may be inf, phase isotropic, rayleigh, hazy, murky, hg,
-        hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH or mie-modified:.. . From Python also columns by name, of any
-        shapes that broadcast together: `phase`, `g` for hg, `x0`, `x1` [m], `sigma_t` [1/m], and either `foot` and
-        `height` [m] or `origin`, `direction` and `light`, (..., 3); or a data frame with such columns.
+        A CSV file with the columns of airlight_integral.csv; x1 may be inf. Its phase functions are isotropic,
+        rayleigh, hazy, murky, hg, hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH and mie-modified. From Python also
+        columns by name, of any shapes that broadcast together: `phase`, `g` for hg, `x0`, `x1` [m], `sigma_t` [1/m],
+        and either `foot` and `height` [m] or `origin`, `direction` and `light`, (..., 3); or a data frame with such
+        columns.
     kernel
         Airlight kernel, see `airlight list kernels`.
     precision
