@@ -49,6 +49,12 @@ class Page(HTMLParser):
         elif not {"style", "svg"} & set(self.open):
             self.words.append(data)
 
+    def addresses(self):
+        """What tags refer to: pairs of tag and address."""
+        names = ("src", "href", "xlink:href", "data", "poster", "srcset", "action")
+        found = ((tag, attributes.get(name)) for tag, attributes in self.tags for name in names)
+        return [(tag, address) for tag, address in found if address is not None]
+
     def attributes(self, tag):
         return [attributes for name, attributes in self.tags if name == tag]
 

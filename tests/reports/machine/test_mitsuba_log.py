@@ -5,13 +5,8 @@ import json
 
 import pytest
 
-SCENE = """<scene version="3.0.0"><medium type="homogeneous" id="fog"><float name="sigma_t" value="0.17"/></medium>
-<sensor type="perspective"><float name="fov" value="49"/><transform name="to_world">
-<lookat origin="0.3, -5.1, 1.4" target="0, 0.4, 0.8" up="0, 0, 1"/></transform><ref name="medium" id="fog"/>
-<film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="6"/></film></sensor>
-<emitter type="point"><point name="position" value="-0.8, 0.3, 2.1"/><rgb name="intensity" value="6.3"/></emitter>
-<shape type="ply"><string name="filename" value="{0}.ply"/></shape>
-<shape type="ply"><string name="filename" value="{0}.ply"/></shape></scene>"""
+from tests.helpers.scenes import LAMP, scene_xml
+
 HEAD = """ply
 format ascii 1.0
 element vertex {}
@@ -41,7 +36,8 @@ def test_json_is_all_that_is_printed(variant, tmp_path, monkeypatch, capfd, orde
     name = order[0]  # each message is said once a process
     vertices = [f"{number * 1e-4:.12f} {number % 7 * 1e-3:.12f} 0.400000000001\n" for number in range(3000)]
     (tmp_path / f"{name}.ply").write_text(HEAD.format(3000) + "".join(vertices) + "3 0 1 2\n3 0 0 1\n")
-    (tmp_path / "own.xml").write_text(SCENE.format(name))
+    mesh = f'<shape type="ply"><string name="filename" value="{name}.ply"/></shape>'
+    (tmp_path / "own.xml").write_text(scene_xml(LAMP, mesh, mesh, size=(8, 6)))
     status = run([order[0], "own.xml", *order[1:], "--json"])
     printed = capfd.readouterr()
     assert status == 0, printed.err

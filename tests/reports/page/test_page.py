@@ -84,14 +84,9 @@ def test_page_needs_nothing_but_itself(data, folder):
     """
     data["scenes"][0]["files"] |= {"picture": "random:7/reference.png"}
     page = render(data, folder)
-    linked = []
-    for tag, attributes in page.tags:
-        for name in ("src", "href", "xlink:href", "data", "poster", "srcset", "action"):
-            target = attributes.get(name)
-            if tag == "a" and target is not None and not target.startswith("#"):
-                linked.append(target)
-            else:
-                assert target is None or target.startswith(("#", "data:,")), (tag, target)
+    linked = [address for tag, address in page.addresses() if tag == "a" and not address.startswith("#")]
+    others = [address for tag, address in page.addresses() if address not in linked]
+    assert all(address.startswith(("#", "data:,")) for address in others), others
     assert "./random:7/reference.png" in linked
     assert all(target.startswith("./") for target in linked)
     assert not {tag for tag, _ in page.tags} & {"iframe", "object", "embed", "img"}
