@@ -27,7 +27,7 @@ from tests.helpers.scenes import spot
 from tests.helpers.sunlit import plank, shaded
 from tests.helpers.transport_formula import use_formula
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 FOLDERS = ("realtime", "validation", "reports")
 
 
@@ -38,8 +38,6 @@ def round_trips() -> Iterator[Counter[str]]:
     Dr.Jit forbids what waits in any other way (`dr.JitFlag.ForbidSynchronization`): that raises. The processor takes
     the way of a GPU where the two differ, `realtime.numerics.array_types`.
     """
-    import pytest
-
     trips: Counter[str] = Counter()
     inside = False
 

@@ -6,12 +6,10 @@ Protects the claim on methods with noise.
 
 from dataclasses import replace
 
-import mitsuba as mi
 import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from realtime.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.methods.registry import find_method
 from tests.helpers.frames import reference_of, renderer
@@ -84,17 +82,6 @@ def test_a_bias_of_the_midpoints_is_found_by_the_same_test(variant):
     noise = biases(*CASES["march-white"], scene)
     fixed = biases("ray-march", {"steps": 3}, scene, runs=1)
     assert least_p(noise + fixed) < 1e-6
-
-
-def test_golden_frames_add_the_golden_ratio_and_jitter_without_steps_is_refused(variant):
-    scene = mi.load_dict(tiny_scene(size=SIZE))
-    for parameters, words in (
-        ({"jitter": "white", "sum": "transitions"}, "jitter: got white with sum=transitions"),
-        ({"jitter": "blue", "tolerance": 0.1}, "wanted sum=steps and tolerance=0"),
-        ({"animate": "golden"}, "animate: got golden without jitter"),
-    ):
-        with pytest.raises(InputError, match=words):
-            renderer(scene, "ray-march", **parameters)
 
 
 def test_surfaces_are_lit_by_many_lights_as_they_are_by_each(variant):

@@ -20,6 +20,11 @@ from tests.helpers.lamps import lamp_scene
         ("light-volumes", {"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*=mesh"),
         ("shadow-planes", {"tolerance": 1.0}, "tolerance: got 1.0, wanted a share"),
         ("shadow-planes", {"tolerance": 0.01}, "got an image of 18 x 12, wanted sides that are multiples of 4"),
+        ("shadow-planes", {"points": 0}, "points: got 0, wanted a whole number from 1 to 4096"),
+        ("shadow-planes", {"pattern": "spiral"}, "pattern: got 'spiral', wanted one of ring, grid, sobol, interleaved"),
+        ("ray-march", {"jitter": "white", "sum": "transitions"}, "jitter: got white with sum=transitions"),
+        ("ray-march", {"jitter": "blue", "tolerance": 0.1}, "wanted sum=steps and tolerance=0"),
+        ("ray-march", {"animate": "golden"}, "animate: got golden without jitter"),
     ],
 )
 def test_parameters_that_cannot_be_are_refused_by_name(variant, method, parameters, message):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: grids of densities are read as Mitsuba reads them, and what is none of a cloud is refused in one line."""
+"""Claim: grids of densities and closed meshes of clouds are read as they are; what is none is refused in one line."""
 
 import mitsuba as mi
 import numpy as np
@@ -9,10 +9,11 @@ from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer
 from realtime.kernels.exact import exact
 from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.scene.closed_mesh import closed_mesh, encloses
 from realtime.scene.density import density_at
 from realtime.scene.read_scene import read_scene
-from tests.helpers.clouds import SUN, cloud, cloud_scene, dense, linear_between, ring
-from validation.scenes.meshes import box, placed
+from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, cloud_of, cloud_scene, dense, linear_between, loaded, ring
+from validation.scenes.meshes import box, joined, placed, torus
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -102,3 +103,33 @@ def test_methods_for_fog_refuse_a_density_and_name_those_for_clouds(name):
     with pytest.raises(InputError, match=r"heterogeneous medium.*cloud-collectors or cloud-octaves") as refusal:
         frame_renderer(read, METHODS[name], **kernel)
     assert "\n" not in str(refusal.value)
+
+
+# Closed meshes around clouds: what lies inside, and where a camera may be --------------------------------------------
+
+
+def flipped(mesh):
+    return mesh[0], mesh[1][:, ::-1]
+
+
+WITHIN = np.array([3.71, -0.13, 2.03]) + 101.37 * TURN[:, 0]  # in the middle of the tube of the ring
+
+
+def test_a_hollow_cloud_and_a_cloud_in_its_hollow_are_taken():
+    shell = joined(
+        [placed(torus(101.0, 41.0, (23, 17)), (0, 0, 0)), placed(flipped(torus(101.0, 17.0, (23, 17))), (0, 0, 0))]
+    )
+    core = placed(torus(101.0, 5.0, (23, 17)), (0, 0, 0))
+    read = read_scene(loaded(sun=SUN, shell=cloud("shell", shell), core=cloud("core", core)))
+    assert read.features.concave == ("shell", "core")
+    mesh = closed_mesh("shell", *shell)
+    assert [encloses(mesh, np.array([x, 0.3, 0.1])) for x in (101.0, 125.0, 150.0, 0.0)] == [False, True, False, False]
+
+
+def test_a_camera_in_a_cloud_references_it():
+    with pytest.raises(InputError, match="the camera is inside of shape 'ring'"):
+        read_scene(mi.load_dict(cloud_scene(origin=tuple(WITHIN))))
+    medium = mi.load_dict(DROPLETS)
+    scene = cloud_scene(origin=tuple(WITHIN), sun=SUN, ring=cloud_of("ring", ring(), medium))
+    scene["sensor"]["medium"] = medium
+    assert read_scene(mi.load_dict(scene)).features.concave == ("ring",)

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Froxel fog: the same sums in plain NumPy, its limits, and its order.
-
-Protects the claims on the integral within a slice, on the limit of fine grids, and on the order of convergence.
-"""
+"""Froxel fog: the same sums in plain NumPy, its limits, and its order, under lamps and area lights."""
 
 from types import SimpleNamespace
 
@@ -15,11 +12,13 @@ from realtime.methods.froxel_fog.accumulation import accumulated
 from realtime.methods.froxel_fog.grid import Grid, column_rays
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Isotropic
+from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_reference
 from tests.helpers import probes
-from tests.helpers.frames import frame, read, reference_of, relative_rmse
+from tests.helpers.frames import frame, read, reference_of, relative_rmse, render
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.suns import brick, pearl, sunny
+from validation.scenes.loading import load_scene
 
 COARSE = {"width": 5, "height": 4, "slices": 7, "far": 7.3}
 
@@ -180,3 +179,17 @@ def test_shadows_of_the_sun_are_there(variant):
     without = frame(scene, "unshadowed").airlight
     froxels = frame(scene, "froxel-fog", shadow="ray").airlight
     assert relative_rmse(froxels, exact) < 0.25 * relative_rmse(without, exact)
+
+
+@pytest.mark.slow
+@pytest.mark.claim("froxel-order", tolerance="at least 0.7 from four grids, a factor of eight apart")
+def test_the_error_falls_with_the_grid_under_a_light_with_extent(variant):
+    scene = read_scene(load_scene("penumbra-plane", (80, 60)).scene)
+    exact = render(scene, "shadow-planes", points=4).airlight
+    sizes = np.array([8, 16, 32, 64])
+    errors = [
+        relative_rmse(render(scene, "froxel-fog", points=4, width=2 * n, height=n, slices=n).airlight, exact)
+        for n in sizes.tolist()
+    ]
+    assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 0.7, errors
+    assert errors[-1] < 0.05
