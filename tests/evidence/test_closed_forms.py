@@ -11,17 +11,11 @@ from realtime.scene.read_scene import read_scene
 from realtime.shadow_maps.projection import Projection
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 from reference.scene.read import read_reference
-from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap, sphere_fluence
+from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.scenes import spot, tiny_scene
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
-
-
-def test_a_sphere_in_vacuum_fills_its_cone():
-    distance = np.array([1.0001, 1.5, 7.0, 1e4])
-    cone = np.pi / distance**2 * 2 / (1 + np.sqrt((1 - 1 / distance) * (1 + 1 / distance)))
-    assert sphere_fluence(0.0, distance, 1.0) == pytest.approx(cone, rel=1e-12)
 
 
 def test_polygons_by_counting_points():

@@ -10,10 +10,6 @@ from scipy import stats
 from tests.helpers.calibration import power
 from tests.helpers.reports import record_of, sampled, times
 from validation.statistics.noise import (
-    ERROR_TOLERANCE,
-    FLOORS,
-    ROUNDING,
-    error_band,
     other_power,
     slower_stages,
     spread,
@@ -118,13 +114,6 @@ def test_sidak_and_the_binomial_law_by_hand():
     assert binomial_p(0, 4, 0.5) == pytest.approx(2 / 16, rel=1e-12)
     assert binomial_p(4, 4, 0.5) == pytest.approx(2 / 16, rel=1e-12)
     assert binomial_p(2, 4, 0.5) == 1
-
-
-def test_the_band_of_an_error_is_relative_plus_rounding():
-    assert error_band("relative_rmse", 0.1) == pytest.approx(0.1 * ERROR_TOLERANCE + 24 * ROUNDING)
-    assert error_band("relative_bias", -0.1) == error_band("relative_bias", 0.1)
-    assert error_band("max", 0.1) == pytest.approx(0.2 * ERROR_TOLERANCE + FLOORS["max"])
-    assert error_band("p99", 0.0) == FLOORS["p99"]
 
 
 def test_spread_is_the_geometric_mean_of_the_quartiles():
