@@ -13,6 +13,7 @@ ray receive, from samples of their own,
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 
 f cos_s by Mitsuba's `BSDF.eval`. Of a flat light V is exact along sections, from which samples are drawn where it is 1.
+A few sections, always the same, say first which points see a flat light only in part: these get sections in pairs.
 `reference.quadrature.light_samples` draws both kinds of samples, `reference.quadrature.replicates` says how many a ray
 gets: eight independent scramblings each give a mean, and their spread the standard error.
 """
@@ -31,7 +32,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.fields import field_of, optical_depth
 from reference.quadrature.light_airlight import worth_of_doubt
-from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points
+from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points, solid_angle
 from reference.quadrature.replicates import (
     PILOT,
     REPLICATES,
@@ -60,6 +61,8 @@ _RTOL = 1e-6  # of the integral of one sample, whose estimate is many digits too
 _PAIRS = 1 << 16  # rays and samples at once
 _EVERY = 7  # of the pairs is checked by a shadow ray: odd, so that it steps through all samples
 _BEFORE = 1e-6  # of the way to a surface: how far before it what lights it is looked at
+_PROBES = 8  # sections of a light that say whether a surface point sees it as a whole
+_WHOLE = 1e-6  # of the solid angle of a section
 _OUTSIDE = 1e-5  # of the radius of a sphere: what is closer to it touches it
 
 
@@ -117,50 +120,64 @@ def area_airlight(
         checked, disagreements, refined, left = (int(value) for value in got["checks"][:4])
         checks.append(RandomChecks(checked, disagreements, refined, left, float(got["checks"][4])))
 
-    def work(beam: Beam, active: Index, square: Array, turn: float) -> Kept:
-        return _scattered(beam, active, square, shadow_scale)
+    def work(number: int, active: Index, points: Callable[[str], Array]) -> Kept:
+        return _scattered(beams[number], active, points(beams[number].light.kind), shadow_scale)
 
-    sums = _by_replicate("airlight", beams, plan, work, tell=tell, keep=keep, add=add)
+    sums = _by_replicate("airlight", len(beams), plan, work, tell=tell, keep=keep, add=add)
     means, used = replicate_means(count, known, plan, sums)
     return AreaAirlight(means, bound / (REPLICATES * used[:, None]), RandomChecks.of_all(checks))
 
 
 def _by_replicate(
     layer: str,
-    beams: list[Beam],
+    lights: int,
     plan: PointPlan,
-    work: Callable[[Beam, Index, Array, float], Kept],
+    work: Callable[[int, Index, Callable[[str], Array]], Kept],
     *,
     tell: Share,
     keep: Keep,
     add: Callable[[Index, Kept], None] = lambda active, got: None,
 ) -> Sums:
-    """Return the sums of a layer for `replicate_means`: work(light, rays, points of the square, turn of sections)."""
-    rounds, done = 2 * plan.rounds * len(beams) * REPLICATES, 0
+    """Return the sums of a layer for `replicate_means`: work(number of the light, rays, points of the square)."""
+    rounds, done = 2 * plan.rounds * lights * REPLICATES, 0
 
-    def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
+    def sums(part: str, chosen: PointPlan, active: Index) -> Array:
         nonlocal done
         total = np.zeros((len(active), 3, REPLICATES))
-        for number, beam in enumerate(beams):
+        for number in range(lights):
+            found, shares = np.zeros(total.shape), np.ones((len(active), REPLICATES))
             for replicate in range(REPLICATES):
-                square = square_points(chosen, number, replicate, beam.light.kind)[slice(*numbers)]
-                one = partial(work, beam, active, square, turn_of_sections(chosen, number, replicate))
-                got = keep(f"{layer}-{part}{number}-{numbers[1]}-{replicate}", one)
-                total[..., replicate] += got["radiance"]
+                one = partial(work, number, active, partial(square_points, chosen, number, replicate))
+                got = keep(f"{layer}-{part}{number}-{chosen.most}-{replicate}", one)
+                found[..., replicate] = got["radiance"]
+                shares[:, replicate] = got.get("share", 1.0)
                 if part != PILOT:
                     add(active, got)
                 done += 1
                 tell(done / rounds)
+            total += _controlled(found, shares)
         return total
 
     return sums
 
 
-def turn_of_sections(plan: PointPlan, number: int, replicate: int) -> float:
-    """Return by what angle a replicate's sections are turned: by a half or one and a half right angles, and around."""
-    along, across = divmod(replicate, 2)
-    shift = (along + np.random.default_rng((plan.seed, number)).random()) / (REPLICATES // 2)
-    return 0.25 * np.pi * (1 + 2 * across + shift - 0.5)
+def _controlled(found: Array, shares: Array) -> Array:
+    """Correct sums of replicates, (rays, 3, replicates), by the known whole of what a part of their samples has.
+
+    A replicate whose sections have the share s of the light's solid angle, of mean 1, is given (1 - s) c more. c is
+    what the whole is worth by the other replicates, which know nothing of s: the mean stays what it is.
+    """
+    others = shares.sum(axis=1, keepdims=True) - shares
+    worth = (found.sum(axis=2, keepdims=True) - found) / np.maximum(others, np.finfo(float).tiny)[:, None]
+    return found + (1 - shares)[:, None] * worth
+
+
+def turn_of_sections(plan: PointPlan, number: int) -> float:
+    """Return by what angle the sections of a light are turned, about half a right angle: edges often follow lights.
+
+    All replicates have one: were the variance of each another, Student's intervals would hold too often.
+    """
+    return 0.25 * np.pi * (0.5 + np.random.default_rng((plan.seed, number)).random())
 
 
 def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) -> Kept:
@@ -226,50 +243,92 @@ def area_surface(
         reference, reference.origin, reference.direction[rows], np.zeros(len(rows)), hits.distance[rows]
     )
 
-    def work(beam: Beam, active: Index, square: Array, turn: float) -> Kept:
-        light = _reflected(beam, rows[active], square, turn, shadow_scale, reflection)
-        return {"radiance": light["radiance"] * np.exp(-depth[active])}
+    turns = [turn_of_sections(plan, number) for number in range(len(beams))]
+    hidden = [_partly_hidden(beam, rows, turn) for beam, turn in zip(beams, turns, strict=True)]
 
-    sums = _by_replicate("surface", beams, plan, work, tell=tell, keep=keep)
+    def work(number: int, active: Index, points: Callable[[str], Array]) -> Kept:
+        radiance, share, beam = np.zeros((len(active), 3)), np.ones(len(active)), beams[number]
+        for pairs, kind in ((False, beam.light.kind), (True, "pairs")):
+            chosen = np.flatnonzero(hidden[number][active] == pairs)
+            if len(chosen):
+                pixels, view = rows[active[chosen]], _View(beam, points(kind), turns[number], pairs)
+                radiance[chosen], share[chosen] = _reflected(view, pixels, shadow_scale, reflection)
+        return {"radiance": radiance * np.exp(-depth[active]), "share": share}
+
+    sums = _by_replicate("surface", len(beams), plan, work, tell=tell, keep=keep)
     result[rows], _ = replicate_means(len(rows), known[rows], plan, sums)
     return result
 
 
-def _reflected(
-    beam: Beam, active: Index, square: Array, turn: float, shadow_scale: float, reflection: Reflection
-) -> Kept:
-    """Return sums over samples of what surface points reflect, before what is between them and the camera."""
-    reference, light, each = beam.scene, beam.light, len(square)
-    total = np.zeros((len(active), 3))
-    end = beam.distance[active]
-    point = reference.origin + end[:, None] * reference.direction[active]
-    away = point - light.centre
-    if light.kind == "sphere":
-        sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _OUTSIDE)
-    elif light.kind == "mesh":
-        sees = np.ones(len(away), bool)  # the samples say it, triangle by triangle
-    else:
-        sees = away @ light.normal > IN_PLANE * max(1.0, float(np.abs(light.centre).max()))
-    seeing = np.flatnonzero(sees)
-    # For its section a surface point is the light.
-    middle = point.mean(axis=0) if len(point) else light.centre
-    around = replace(beam.known(), light=Ball(middle, float(np.linalg.norm(point - middle, axis=1).max(initial=0.0))))
-    step = max(1, _PAIRS // each)
-    for first in range(0, len(seeing), step):
-        rows = seeing[first : first + step]
-        sections = sections_for_points(light, point[rows], square, turn)
-        # Looked at from a little before the surface, where the camera sees it: what hides there is not its own.
-        eye = reference.origin + (end - _BEFORE * (1 + end))[rows, None] * reference.direction[active[rows]]
-        eye, uniform = np.repeat(eye, each, axis=0), np.tile(square[:, 1], len(rows))
-        row, place, weight = seen_samples(sections, eye, around, np.repeat(active[rows], each), uniform)
+@dataclass(frozen=True)
+class _View:
+    """How surface points look at a light: at which sections."""
+
+    beam: Beam
+    square: Array  # points of the unit square, (sections, 2)
+    turn: float  # [rad]
+    even: bool  # see `sections_for_points`
+
+    def seen(self, active: Index) -> Iterator[tuple[Index, Array, tuple[Index, Array, Array], Array]]:
+        """Yield which of the surface points of some rays see the light, these points, what `seen_samples` says of their
+        sections in the order of points and of the square, and the mean of the weights of all sections of a point.
+        """
+        reference, light, each = self.beam.scene, self.beam.light, len(self.square)
+        end = self.beam.distance[active]
+        point = reference.origin + end[:, None] * reference.direction[active]
+        away = point - light.centre
+        if light.kind == "sphere":
+            sees = np.linalg.norm(away, axis=1) > light.radius * (1 + _OUTSIDE)
+        elif light.kind == "mesh":
+            sees = np.ones(len(away), bool)  # the samples say it, triangle by triangle
+        else:
+            sees = away @ light.normal > IN_PLANE * max(1.0, float(np.abs(light.centre).max()))
+        seeing = np.flatnonzero(sees)
+        # For its section a surface point is the light.
+        middle = point.mean(axis=0) if len(point) else light.centre
+        ball = Ball(middle, float(np.linalg.norm(point - middle, axis=1).max(initial=0.0)))
+        around = replace(self.beam.known(), light=ball)
+        step = max(1, _PAIRS // each)
+        for first in range(0, len(seeing), step):
+            rows = seeing[first : first + step]
+            sections = sections_for_points(light, point[rows], self.square, self.turn, self.even)
+            # Looked at from a little before the surface, where the camera sees it: what hides there is not its own.
+            eye = reference.origin + (end - _BEFORE * (1 + end))[rows, None] * reference.direction[active[rows]]
+            eye, uniform = np.repeat(eye, each, axis=0), np.tile(self.square[:, 1], len(rows))
+            seen = seen_samples(sections, eye, around, np.repeat(active[rows], each), uniform)
+            yield rows, point[rows], seen, sections.weight.reshape(-1, each)
+
+
+def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
+    """Return from which surface points a flat light is not seen as a whole, as a few sections say."""
+    hidden = np.zeros(len(active), bool)
+    if beam.light.kind in ("rectangle", "disk"):
+        square = np.stack([(np.arange(_PROBES) + 0.5) / _PROBES, np.full(_PROBES, 0.5)], axis=1)
+        for rows, _, (row, _, weight), whole in _View(beam, square, turn, True).seen(active):
+            seen = np.bincount(row, weight, whole.size).reshape(whole.shape)
+            hidden[rows] = (seen < (1 - _WHOLE) * whole).any(axis=1)
+    return hidden
+
+
+def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Reflection) -> tuple[Array, Array]:
+    """Return sums over samples of what surface points reflect, before what is between them and the camera.
+
+    The second array says which share of the light's solid angle the sections of a point have, (rays,) [1].
+    """
+    light, reference, each = view.beam.light, view.beam.scene, len(view.square)
+    total, share = np.zeros((len(active), 3)), np.ones(len(active))
+    for rows, point, (row, place, weight), whole in view.seen(active):
+        if view.even and light.kind == "rectangle":
+            share[rows] = whole.mean(axis=1) / solid_angle(light, point)
         of = rows[row // each]
-        way = place - point[of]
+        point = point[row // each]
+        way = place - point
         r = np.linalg.norm(way, axis=1)
         towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
         value = reflection(active[of], towards)
-        shadow = optical_depth(reference, point[of], towards, np.zeros(len(of)), shadow_scale * r)
+        shadow = optical_depth(reference, point, towards, np.zeros(len(of)), shadow_scale * r)
         total += sums_of(of, value * np.exp(-shadow) * weight[:, None] * light.radiance, len(total))
-    return {"radiance": total}
+    return total, share
 
 
 def seen_samples(

@@ -118,14 +118,14 @@ def _means(
     groups = [[replicate] for replicate in range(REPLICATES)] if reference.is_sampled else [list(range(REPLICATES))]
     rounds, done = 2 * _POSITIONS.rounds * len(groups), 0
 
-    def sums(part: str, chosen: PointPlan, active: Index, numbers: tuple[int, int]) -> Array:
+    def sums(part: str, chosen: PointPlan, active: Index) -> Array:
         nonlocal done
         total = []
         for group in groups:
-            square = np.stack([square_points(chosen, 0, replicate, "pixel")[slice(*numbers)] for replicate in group])
+            square = np.stack([square_points(chosen, 0, replicate, "pixel") for replicate in group])
             positions = (corner[active, None] + square[:, None]).reshape(-1, 2)
             owner = np.repeat(np.arange(len(group) * len(active)), square.shape[1])
-            of_lights = replace(lights, seed=chosen.seed * REPLICATES + group[0] + (numbers[0] << 16))
+            of_lights = replace(lights, seed=chosen.seed * REPLICATES + group[0] + (chosen.most << 16))
             parts = []
             for first in range(0, len(positions), _CHUNK):
                 direction = film_directions(sensor, positions[first : first + _CHUNK], size)

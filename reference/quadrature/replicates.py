@@ -12,13 +12,13 @@ small. With n_k = 2^k n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi
 where a round that stops by chance has an S_k below e and far below sigma_k. For independent rounds with S ~ 1/N this is
 92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4 to 95 %: too few.
 
-So a pilot decides, and is not counted: eight replicates of other scramblings, doubled until they foresee a standard
-error at twice their points that is small enough. N is then independent of the points that count, and Student's
-distribution holds whatever N is. The pilot takes half of the points that it foresees, so all costs one and a half times
-as much as the points that count. It foresees S ~ N^-3/2, the rate of scrambled nets of smooth functions (Owen 1997,
-Scrambled net variance for integrals of smooth functions); measured in fog 1.5, on surfaces in penumbrae 1.0 to 1.2.
-Where that is too hopeful, the error that is stated is up to 1.4 times the one that was asked for, and right. A ray that
-could not reach the error with all its points at that rate gets them all at once.
+So a pilot decides, and is not counted: eight replicates of other scramblings, of four times as many points each time,
+until they foresee a standard error that is small enough at not more than four times their points. N is then independent
+of the points that count, and Student's distribution holds whatever N is; all costs 1.2 to 1.7 times as much as the
+points that count. They foresee S ~ N^-5/4, a little less than the N^-3/2 of scrambled nets of smooth functions (Owen
+1997, Scrambled net variance for integrals of smooth functions), which is what fog has. Where that is too hopeful, the
+error that is stated is larger than the one that was asked for, and right. A ray that could not reach the error with all
+its points at that rate gets them all at once.
 
 **Points of the unit square.** They are Sobol's in base 2, scrambled at random: in each coordinate a digit is flipped or
 not by a coin of its own for each value of the digits before it (Owen 1995, Randomly permuted (t,m,s)-nets and
@@ -27,6 +27,12 @@ scramblings show its spread. Sums over nets of that scrambling become normal (Lo
 of scrambled net quadrature), as Student's intervals of a few replicates take for granted. A random matrix with a
 digital shift has the same variance but rarely a large error, often next to none: kurtosis 50 at 128 points of a light
 in a penumbra, where nested scrambling has -0.2, and intervals that hold in 99 % of all runs.
+
+**Pairs.** A smooth function of the first coordinate alone leaves N^-3/2 of a scrambled net, since each point is
+anywhere in its stratum. Two points of a stratum of twice the width, mirrored at its middle, leave nothing of what is
+linear there, and N^-5/2 of what is smooth; at a kink they leave N^-2 (Owen 2008, Local antithetic sampling with
+scrambled nets). With the other coordinate mirrored, 1 - v, what is linear in that goes too. Points that are pairs for
+one N are none for another: so each count of points is a set of its own.
 
 What a sphere sends is smooth, and periodic in an angle. There a lattice does better, (i, 1555 i)/N modulo 1, with a
 random shift, folded in the first coordinate by a tent, u = 1 - |2 t - 1|, and in the order of the mirrored digits of i,
@@ -43,7 +49,6 @@ from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Range = tuple[int, int]
 Kept = Mapping[str, Array]
 Keep = Callable[[str, Callable[[], Kept]], Kept]
 
@@ -52,7 +57,8 @@ PILOT = "pilot-"  #: the name of the part of the work that decides
 _PILOT_SEED = 1 << 30  # apart from the seeds of points that count
 REPLICATES = 8  #: independent scramblings
 _LATTICE = np.array([1.0, 1555.0])
-_RATE = 1.5  # the power of 1/N by which a standard error is foreseen to fall
+_AHEAD = 4  # times the points of a pilot: the most that it foresees
+_RATE = 1.25  # the power of 1/N by which a standard error is foreseen to fall
 
 
 @dataclass(frozen=True)
@@ -74,9 +80,16 @@ class PointPlan:
 def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Array:
     """Return the points of the unit square of a replicate of a light, (plan.most, 2) [1].
 
-    `plan`: how many, and the seed; `number`, `kind`: of the light; `replicate`: number of the replicate.
+    `plan`: how many, and the seed; `number`: of the light; `replicate`: number of the replicate; `kind`: of the light,
+    or "pairs" for points by twos, mirrored.
     """
     generator = np.random.default_rng((plan.seed, number, replicate))
+    if kind == "pairs" and plan.most > 1:
+        half = plan.most // 2
+        u, v = square_points(replace(plan, most=half), number, replicate, "").T
+        stratum = np.floor(half * u)  # one point in each, moved to its lower half
+        u = 0.5 * (stratum / half + u)
+        return np.stack([np.concatenate([u, (2 * stratum + 1) / half - u]), np.concatenate([v, 1 - v])], axis=1)
     if kind == "sphere":
         place = np.array([mirrored_digits(i) for i in range(plan.most)])
         place = np.mod(place[:, None] * _LATTICE + generator.random(2), 1.0)
@@ -101,7 +114,7 @@ def mirrored_digits(number: int) -> float:
     return float(int(f"{number:032b}"[::-1], 2)) / 2.0**32
 
 
-Sums = Callable[[str, PointPlan, Index, Range], Array]
+Sums = Callable[[str, PointPlan, Index], Array]
 
 
 def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tuple[Array, Index]:
@@ -109,40 +122,36 @@ def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tup
 
     `rays`: how many; `known`: what else they receive, to which errors are relative too, (rays, columns); `plan`: the
     error to reach, and how many points a ray has; `sums`: called with `PILOT`, or an empty name for what counts, the
-    plan with its seed, the numbers of some rays, and the range of the numbers of points; returns what these give in
-    each replicate, added up, (rays, columns, replicates).
+    plan with its seed and as many points, `most`, as these rays get, and the numbers of some rays; returns what all
+    points give in each replicate, added up, (rays, columns, replicates).
     """
     counts = np.full(rays, plan.most)
     if plan.error > 0 and plan.first < plan.most:
         counts = _planned(rays, known, plan, sums)
-    total = np.zeros((*known.shape, REPLICATES))
-    low = 0
-    for high in sorted(set(counts.tolist())):
-        active = np.flatnonzero(counts >= high)
-        total[active] += sums("", plan, active, (low, high))
-        low = high
-    means = total / counts[:, None, None]
+    means = np.zeros((*known.shape, REPLICATES))
+    for count in sorted(set(counts.tolist())):
+        active = np.flatnonzero(counts == count)
+        means[active] = sums("", replace(plan, most=count), active) / count
     return means, counts
 
 
 def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
     """Return how many points each ray needs."""
-    pilot = replace(plan, seed=plan.seed + _PILOT_SEED)
-    counts = np.full(rays, plan.most)
-    total = np.zeros((*known.shape, REPLICATES))
-    active, low, high = np.arange(rays), 0, max(1, plan.first // 2)
+    counts, active, count = np.full(rays, plan.most), np.arange(rays), max(1, plan.first // 2)
     floor: Array | None = None
-    while len(active) and 2 * high < plan.most:
-        total[active] += sums(PILOT, pilot, active, (low, high))
-        mean = total[active] / high
+    while len(active) and 2 * count < plan.most:
+        pilot = replace(plan, seed=plan.seed + _PILOT_SEED, most=count)
+        mean = sums(PILOT, pilot, active) / count
         value = mean.mean(axis=-1) + known[active]
         if floor is None:
             floor = FLOOR * value.mean(axis=0)
         # The largest of the channels: standard error over the one that is allowed.
         excess = (standard_error(mean) / (plan.error * np.maximum(value, floor) + np.finfo(float).tiny)).max(axis=1)
-        enough, hopeless = excess <= 2**_RATE, excess > (plan.most / high) ** _RATE
-        counts[active[enough]] = 2 * high
-        active, low, high = active[~(enough | hopeless)], high, 2 * high
+        needed = np.clip(count * excess ** (1 / _RATE) / plan.first, 1.0, plan.most / plan.first)
+        near = needed * plan.first <= _AHEAD * count
+        foreseen = plan.first << np.ceil(np.log2(needed)).astype(int)
+        counts[active[near]] = np.maximum(foreseen[near], 2 * count)
+        active, count = active[~near & (foreseen < plan.most)], _AHEAD * count
     return counts
 
 

@@ -112,7 +112,7 @@ def visible_share(reference: ReferenceScene, place, normal, samples: int):
         for replicate in range(REPLICATES):
             plan = PointPlan(most=samples)
             square = square_points(plan, 0, replicate, light.kind)
-            sections = sections_for_points(light, point[None], square, turn_of_sections(plan, 0, replicate))
+            sections = sections_for_points(light, point[None], square, turn_of_sections(plan, 0))
             eye, of = np.broadcast_to(point + 1e-6 * normal, (samples, 3)), np.zeros(samples, np.int64)
             _, seen_at, angle = seen_samples(sections, eye, known, of, square[:, 1])
             way = point - seen_at

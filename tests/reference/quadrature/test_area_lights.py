@@ -151,9 +151,9 @@ def test_a_light_does_not_shadow_itself_and_black_is_null_for_what_it_sends(vari
     assert images[0].surface[same] == pytest.approx(images[1].surface[same], rel=1e-6, abs=1e-12)
 
 
-@pytest.mark.claim("area-light-closed-forms", tolerance="1.3 times the standard error of 1e-3 that is asked for")
+@pytest.mark.claim("area-light-closed-forms", tolerance="the standard error of 1e-3 that is asked for")
 def test_half_a_plane_before_a_rectangle(variant):
-    """A white floor under a rectangle that half a plane covers, by the default plan, in closed form.
+    """A white floor under a rectangle that half a plane covers, by the default plan and by 64 sections, in closed form.
 
     The floor receives Le times the form factor of what is left, a rectangle (Howell, A catalog of radiation heat
     transfer configuration factors, B-4).
@@ -179,9 +179,12 @@ def test_half_a_plane_before_a_rectangle(variant):
     sides = [(1, a, b), (-1, -a, b), (-1, a, left), (1, -a, left)]
     expected = sum(sign * from_foot(end - x, side - y) for sign, end, side in sides) / np.pi
     known = np.zeros((len(x), 3))
-    got = area_surface(reference, hits, beams_of(reference, hits.distance), known, plan=PointPlan())[:, 0].mean(axis=1)
     assert 0.4 < np.mean((left > -b) & (left < b)) < 0.8
-    assert np.sqrt(np.mean((got - expected) ** 2)) < 1.3e-3 * expected.mean()
+    # Root mean squares over 24 seeds: 8.5e-4, and 2.2e-4 of 64 sections; without pairs 1.4e-3 and 1.3e-3.
+    beams = beams_of(reference, hits.distance)
+    for plan, most in ((PointPlan(), 1e-3), (fixed(64), 3e-4)):
+        got = [area_surface(reference, hits, beams, known, plan=replace(plan, seed=seed))[:, 0] for seed in range(4)]
+        assert np.sqrt(np.mean((np.mean(got, axis=2) - expected) ** 2)) < most * expected.mean()
 
 
 @pytest.mark.parametrize("kind", ["mesh", "rectangle", "sphere", pytest.param("disk", marks=pytest.mark.slow)])

@@ -27,9 +27,9 @@ def test_intervals_of_independent_points_hold():
     random = np.random.default_rng(5)
     asked = []
 
-    def sums(part, plan, active, numbers):
-        asked.append((part, plan.seed, *numbers))
-        count = numbers[1] - numbers[0]
+    def sums(part, plan, active):
+        count = plan.most
+        asked.append((part, plan.seed, count))
         drawn = random.standard_normal((len(active), 3, REPLICATES)) * np.sqrt(count)
         return count + spread[active] * drawn
 
@@ -41,26 +41,25 @@ def test_intervals_of_independent_points_hold():
     chosen = (counts > 16) & (counts < 1024)
     assert held[chosen].mean() == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / chosen.sum()))
     assert chosen.sum() > rays / 5
-    # A pilot of half the points has seeds of its own.
+    # Pilots have seeds of their own.
     pilots = {entry for entry in asked if entry[0] == PILOT}
-    assert max(entry[3] for entry in pilots) == 256
+    assert {entry[2] for entry in pilots} == {8, 32, 128}
     assert not {entry[1] for entry in pilots} & {entry[1] for entry in set(asked) - pilots}
 
 
 def test_points_follow_the_error_that_is_asked_for():
-    """Replicates that differ by c N^-3/2 have that over sqrt 8 for their error: points are doubled until it is met."""
+    """Replicates that differ by c N^-5/4 have that over sqrt 8 for their error: it is foreseen by the first pilots."""
     place = np.linspace(-1, 1, REPLICATES)
     place = place / place.std(ddof=1)
 
-    def sums(part, plan, active, numbers):
-        sum_to = [10.0 * number + 0.9 * scale[active] * place * (number and number**-0.5) for number in numbers]
-        return np.repeat((sum_to[1] - sum_to[0])[:, None], 3, axis=1)
+    def sums(part, plan, active):
+        return np.repeat((10.0 * plan.most + 0.9 * scale[active] * place * plan.most**-0.25)[:, None], 3, axis=1)
 
-    scale = np.array([[1e-3], [8.0], [110.0], [1e6]])
+    scale = np.array([[1e-3], [4.0], [25.0], [1e6]])
     for error, first in ((1e-3, 16), (2e-3, 4)):
         plan = PointPlan(error=error, first=first, most=256)
         means, counts = replicate_means(4, np.zeros((4, 3)), plan, sums)
-        wanted = (0.09 * scale[:, 0] / np.sqrt(8) / error) ** (2 / 3)
+        wanted = (0.09 * scale[:, 0] / np.sqrt(8) / error) ** (4 / 5)
         powers = 2.0 ** np.ceil(np.log2(wanted))
         assert counts.tolist() == np.clip(powers, first, 256).astype(int).tolist()
         assert (standard_error(means)[:3] <= error * means.mean(axis=2)[:3]).all()
