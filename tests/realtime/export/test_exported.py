@@ -26,7 +26,6 @@ from tests.realtime.kernels.test_exact import g_of, many_rays
 
 QUICK = (("exact", "hg"), ("exact", "murky"), ("quadrature-16", "isotropic"))
 ALL = [(kernel, phase) for kernel in KERNELS for phase in PHASES]
-LANGUAGES = ("glsl", "hlsl", "wgsl", "slang")
 
 
 @pytest.mark.claim("exported-kernels", tolerance="5e-6 of exact; the stated figure by half, for other drivers")
