@@ -32,6 +32,19 @@ Array = NDArray[np.float64]
 Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers of mean 0 and standard deviation 1
 
 LEVEL = 0.01  #: of the tests of values, pixels and blocks
+BATCHES, SIZE = 16, (24, 24)  #: of images
+
+
+def monte_carlo(batches: Array) -> Estimate:
+    """Return the estimate that a renderer would give, from its batch means (batches, height, width, ...)."""
+    count = len(batches)
+    error = batches.std(axis=0, ddof=1) / np.sqrt(count)
+    return Estimate(batches.mean(axis=0), error, count, batches.mean(axis=(1, 2)))
+
+
+def around_one(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    """Draw batches of an image of ones."""
+    return rng.normal(1, 0.3, shape)
 
 
 def normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
@@ -131,10 +144,8 @@ def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Sta
     profile = _profile(experiment.size)
 
     def estimate(image: Array) -> Estimate:
-        """Return what a renderer gives of an image: mean, standard error and batch means."""
-        images = image * (1 + spread * experiment.law(rng, (experiment.batches, *image.shape)))
-        error = images.std(axis=0, ddof=1) / np.sqrt(experiment.batches)
-        return Estimate(images.mean(axis=0), error, experiment.batches, images.mean(axis=(1, 2)))
+        noise = spread * experiment.law(rng, (experiment.batches, *image.shape))
+        return monte_carlo(image * (1 + noise))
 
     comparisons = []
     for _ in range(experiment.runs):

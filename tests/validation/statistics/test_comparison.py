@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from analytic.errors import InputError
-from tests.helpers.estimates import BATCHES, SIZE, monte_carlo, normal
+from tests.helpers.calibration import BATCHES, SIZE, around_one, monte_carlo
 from validation.statistics.comparison import Estimate, compare_statistics
 
 
@@ -82,7 +82,7 @@ def test_the_variance_of_both_sides_counts_and_is_told_apart():
 
 def test_mask_and_nonfinite_pixels_leave_no_trace():
     rng = np.random.default_rng(2)
-    estimate = monte_carlo(normal(rng, (BATCHES, 8, 8, 3)))
+    estimate = monte_carlo(around_one(rng, (BATCHES, 8, 8, 3)))
     wide = np.full((8, 16, 3), np.nan)
     wide[:, :8] = estimate.mean
     error = np.full((8, 16, 3), -1.0)
@@ -99,7 +99,7 @@ def test_mask_and_nonfinite_pixels_leave_no_trace():
 
 def test_dependent_channels_do_not_narrow_the_interval():
     rng = np.random.default_rng(5)
-    grey = monte_carlo(normal(rng, (BATCHES, *SIZE)))
+    grey = monte_carlo(around_one(rng, (BATCHES, *SIZE)))
     colour = Estimate(*(np.repeat(np.asarray(v)[..., None], 3, axis=-1) for v in (grey.mean, grey.standard_error)), 16)
     of_grey = compare_statistics(Estimate(np.ones(SIZE)), grey)
     of_colour = compare_statistics(Estimate(np.ones((*SIZE, 3))), colour)
@@ -109,7 +109,7 @@ def test_dependent_channels_do_not_narrow_the_interval():
 @pytest.mark.claim("detectable-bias")
 def test_detectable_bias_is_that_of_the_wider_interval():
     rng = np.random.default_rng(10)
-    estimate = monte_carlo(normal(rng, (BATCHES, *SIZE)) * rng.normal(1, 0.1, (BATCHES, 1, 1)))
+    estimate = monte_carlo(around_one(rng, (BATCHES, *SIZE)) * rng.normal(1, 0.1, (BATCHES, 1, 1)))
     s = compare_statistics(Estimate(np.ones(SIZE)), estimate)
     # Few batches: (q(0.975) + q(0.90)) / q(0.975) of Student's law with 15 degrees of freedom, 2.131 and 1.341.
     half = 0.5 * (s.relative_bias_ci_batches[1] - s.relative_bias_ci_batches[0])

@@ -11,15 +11,18 @@ import numpy as np
 import pytest
 
 from tests.helpers.calibration import (
+    BATCHES,
+    SIZE,
     Experiment,
+    around_one,
     calibrate,
     log_normal,
+    monte_carlo,
     power_and_finds,
     problems,
     share_interval,
     spread_to_detect,
 )
-from tests.helpers.estimates import BATCHES, SIZE, monte_carlo, normal
 from validation.statistics.comparison import Estimate, compare_statistics
 
 pytestmark = pytest.mark.statistical
@@ -49,7 +52,7 @@ def assert_rate(events, probability):
 @pytest.fixture(scope="module")
 def null():
     """Comparisons of images that agree."""
-    return repeated(normal, runs=600, margin=0.01)
+    return repeated(around_one, runs=600, margin=0.01)
 
 
 @pytest.mark.claim("agreement-inside-the-margin")
@@ -67,13 +70,13 @@ def test_equivalence_is_wrong_in_one_of_forty_runs_at_its_margin():
 def test_few_samples_prove_nothing(null):
     # Half of the width of the interval is 0.6 % here, so that 1 % is proved by most runs and 0.5 % by none.
     assert np.mean([s.equivalent for s in null]) > 0.5
-    assert not any(s.equivalent for s in repeated(normal, runs=50, margin=0.005))
+    assert not any(s.equivalent for s in repeated(around_one, runs=50, margin=0.005))
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.25])
 def test_wrong_standard_errors_are_found_in_both_directions(factor):
     rng = np.random.default_rng(13)
-    estimate = monte_carlo(normal(rng, (BATCHES, 64, 64)))
+    estimate = monte_carlo(around_one(rng, (BATCHES, 64, 64)))
     wrong = dataclasses.replace(estimate, standard_error=factor * np.asarray(estimate.standard_error))
     right = compare_statistics(Estimate(np.ones((64, 64))), estimate)
     s = compare_statistics(Estimate(np.ones((64, 64))), wrong)
@@ -85,7 +88,7 @@ def test_wrong_standard_errors_are_found_in_both_directions(factor):
 def test_dependent_pixels_show_in_the_interval_from_batches():
     # A factor common to all pixels of a batch: the pixels' interval is far too narrow, the batches' is right.
     def dependent(rng, shape):
-        return normal(rng, shape) * rng.normal(1, 0.1, (shape[0], 1, 1))
+        return around_one(rng, shape) * rng.normal(1, 0.1, (shape[0], 1, 1))
 
     runs = repeated(dependent, runs=300, seed=14)
     assert_rate((s.relative_bias_ci_batches[0] <= 0 <= s.relative_bias_ci_batches[1] for s in runs), 0.95)
