@@ -41,7 +41,7 @@ also have some T. So there are
     m = ceil(max((v1 - v0)/w, T/T1))
 
 equal panels. w is the largest width at which the rule leaves no more than 1e-6 of any panel, which each phase function
-knows of itself (`realtime.scene.rule_reach`); `tests/realtime/kernels/test_panels.py` tries random rays.
+knows of itself (`realtime.scene.rule_reach`); `tests/realtime/kernels/test_exact.py` tries random rays.
 
 **What they cost.** All rays of a packet take part in as many steps as the one that needs most, no more. Panels of a ray
 are equally wide: sinh and cosh of the offsets of the nodes are the same in each, and computed once. From the start of a
