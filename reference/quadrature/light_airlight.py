@@ -46,19 +46,29 @@ class LitRays:
 
 
 def light_airlight(
-    reference: ReferenceScene, light: ReferenceLight, distance: Array, *, shadow_scale: float = 1.0, **how: Any
+    reference: ReferenceScene,
+    light: ReferenceLight | DirectionalLight,
+    distance: Array,
+    *,
+    shadow_scale: float = 1.0,
+    **how: Any,
 ) -> LightAirlight:
-    """Compute the airlight of one point or spot light along every ray.
+    """Compute the airlight of one point, spot or directional light along every ray.
 
     `reference`, `light`: the scene and one of its lights; `distance`: to the visible surface, (rays,), infinite where
     there is none [m]; `shadow_scale`: see `reference.quadrature.image.quadrature_image`; `how`: see `lit_rays`.
     """
     found = lit_rays(reference, light, distance, **how)
-    rays, lit = found.rays, found.lit
-    radiance, bound = lit_sums(reference, light, rays, lit, distance, shadow_scale)
-    in_front = (rays.foot > 0) & (rays.foot < distance)
-    angle = np.where(in_front, np.arctan2(rays.height, rays.foot), np.pi)
-    bound = bound + worth_of_doubt(reference, rays, lit) * light.intensity
+    rays, lit, angle = found.rays, found.lit, np.full(len(distance), np.pi)
+    if isinstance(light, DirectionalLight):
+        strength = light.irradiance
+        radiance, bound = _sun_sums(reference, light, found)
+    else:
+        strength = light.intensity
+        radiance, bound = lit_sums(reference, light, rays, lit, distance, shadow_scale)
+        in_front = (rays.foot > 0) & (rays.foot < distance)
+        angle = np.where(in_front, np.arctan2(rays.height, rays.foot), angle)
+    bound = bound + worth_of_doubt(reference, rays, lit) * strength
     return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
 
 
@@ -77,50 +87,52 @@ def lit_sums(
     return value * light.intensity, bound * light.intensity
 
 
+def _sun_sums(reference: ReferenceScene, light: DirectionalLight, found: LitRays) -> tuple[Array, Array]:
+    rays, lit = found.rays, found.lit
+    _, _, high = stretches = sun_stretches(reference, found)
+    # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
+    scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
+    edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(found.distance)))
+    terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
+    value, bound = field_of(reference).sums(rays, stretches, found.distance, terms)
+    return value * light.irradiance, bound * light.irradiance
+
+
 def lit_rays(
     reference: ReferenceScene,
-    light: ReferenceLight,
+    light: ReferenceLight | DirectionalLight,
     distance: Array,
     *,
     shapes: Shapes | None = None,
     known: Obstacles | None = None,
     checks: int = 32,
 ) -> LitRays:
-    """Return which parts of the rays a point or spot light reaches.
+    """Return which parts of the rays a point, spot or directional light reaches.
 
     `reference`, `light`, `distance`: see `light_airlight`; `shapes`: what `reference.scene.shapes.read_shapes`
-    returned, if known; `known`: what can stand in the light, if that was found for a ball that holds it; `checks`:
+    returned, if known; `known`: what can stand in a point light, if that was found for a ball that holds it; `checks`:
     random shadow rays to each ray.
     """
-    rays = rays_at(reference.origin, reference.direction, light.position)
-    cone = cone_interval(rays, light, light.cutoff)
-    none = cone[0] > cone[1]
-    ends = np.maximum(rays.distance(cone[0]), 0.0), np.minimum(rays.distance(cone[1]), distance)
-    ends = np.where(none, 0.0, ends[0]), np.where(none, 0.0, ends[1])
     normal = None
-    if light.cosine and light.axis is not None:
-        normal = np.broadcast_to(light.axis, reference.direction.shape)
-    known = obstacles(reference, Ball(light.position), distance, shapes) if known is None else known
+    if isinstance(light, DirectionalLight):
+        rays, ball = rays_at(reference.origin, reference.direction, -light.direction, w=0), Ball(-light.direction, w=0)
+        shapes = read_shapes(reference.occluders) if shapes is None else shapes
+        # No shadow falls on a ray where it has left the light's cylinder about all shapes.
+        clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
+        last = np.minimum(field_of(reference).leave(reference.origin, reference.direction), clear)
+        far = np.where(np.isfinite(distance), distance, last)
+        ends = np.zeros_like(far), far
+    else:
+        rays, ball, far = rays_at(reference.origin, reference.direction, light.position), Ball(light.position), distance
+        cone = cone_interval(rays, light, light.cutoff)
+        none = cone[0] > cone[1]
+        ends = np.maximum(rays.distance(cone[0]), 0.0), np.minimum(rays.distance(cone[1]), distance)
+        ends = np.where(none, 0.0, ends[0]), np.where(none, 0.0, ends[1])
+        if light.cosine and light.axis is not None:
+            normal = np.broadcast_to(light.axis, reference.direction.shape)
+    known = obstacles(reference, ball, far, shapes) if known is None else known
     lit = lit_intervals(rays, ends, known, checks=checks, normal=normal)
     return LitRays(rays, lit, distance, known.shapes, ends[1])
-
-
-def directional_airlight(
-    reference: ReferenceScene, light: DirectionalLight, distance: Array, **how: Any
-) -> LightAirlight:
-    """Compute the airlight of one directional light along every ray; see `light_airlight`."""
-    found = lit_parallel_rays(reference, light, distance, **how)
-    rays, lit = found.rays, found.lit
-    field, angle = field_of(reference), np.full(len(distance), np.pi)
-    _, _, high = stretches = sun_stretches(reference, found)
-    # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
-    scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
-    edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(distance)))
-    terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
-    sums = field.sums(rays, stretches, distance, terms)
-    radiance, bound = (part * light.irradiance for part in sums)
-    bound = bound + worth_of_doubt(reference, rays, lit) * light.irradiance
-    return LightAirlight(radiance, bound, angle, lit, reaches(lit, distance))
 
 
 def sun_stretches(reference: ReferenceScene, found: LitRays) -> Stretches:
@@ -133,26 +145,6 @@ def sun_stretches(reference: ReferenceScene, found: LitRays) -> Stretches:
         goes_on & last, field_of(reference).leave(reference.origin, reference.direction)[lit.ray], lit.high
     )
     return lit.ray, lit.low, np.maximum(lit.high, leaves)
-
-
-def lit_parallel_rays(
-    reference: ReferenceScene,
-    light: DirectionalLight,
-    distance: Array,
-    *,
-    shapes: Shapes | None = None,
-    checks: int = 32,
-) -> LitRays:
-    """Return which parts of the rays a directional light reaches; see `lit_rays`."""
-    rays = rays_at(reference.origin, reference.direction, -light.direction, w=0)
-    shapes = read_shapes(reference.occluders) if shapes is None else shapes
-    # No shadow falls on a ray where it has left the light's cylinder about all shapes.
-    clear = coordinates(rays, shapes) * np.minimum(1.0, rays.height / _LEAST_SINE)
-    last = np.minimum(field_of(reference).leave(reference.origin, reference.direction), clear)
-    end = np.where(np.isfinite(distance), distance, last)
-    known = obstacles(reference, Ball(-light.direction, w=0), end, shapes)
-    lit = lit_intervals(rays, (np.zeros_like(end), end), known, checks=checks)
-    return LitRays(rays, lit, distance, known.shapes, end)
 
 
 def worth_of_doubt(reference: ReferenceScene, rays: Rays, lit: LitIntervals) -> Array:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.area_lights import area_airlight, area_surface, beams_of
 from reference.quadrature.emission import emitted_light
-from reference.quadrature.light_airlight import directional_airlight, light_airlight
+from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.replicates import Keep, PointPlan
 from reference.quadrature.sky import sky_light
 from reference.quadrature.surface import lit_surface, surface_hits
@@ -112,10 +112,7 @@ def ray_values(
     total = len(reference.lights) + len(reference.directional) + _STEPS * wide_parts
     lights: list[ReferenceLight | DirectionalLight] = [*reference.lights, *reference.directional]
     for number, light in enumerate(lights):
-        if isinstance(light, DirectionalLight):
-            received = directional_airlight(reference, light, hits.distance, **how)
-        else:
-            received = light_airlight(reference, light, hits.distance, shadow_scale=shadow_scale, **how)
+        received = light_airlight(reference, light, hits.distance, shadow_scale=shadow_scale, **how)
         airlight += received.radiance
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.quadrature.fields import optical_depth
-from reference.quadrature.light_airlight import directional_airlight
+from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.surface import UNBOUNDED, Reflection, SurfaceHits
 from reference.scene.directional_light import DirectionalLight
@@ -74,7 +74,7 @@ def sky_light(
         square = square_points(PointPlan(most=most, seed=plan.seed), _NUMBER, replicate, "sphere")
         for number, direction in enumerate(_directions(square)):
             sun = DirectionalLight(direction, reference.sky * 4 * np.pi / most, None)
-            received = directional_airlight(reference, sun, hits.distance, shapes=shapes, checks=0)
+            received = light_airlight(reference, sun, hits.distance, shapes=shapes, checks=0)
             replicates[:, :3, replicate] += received.radiance
             bound += received.bound / REPLICATES
             lit = received.reached[visible]

@@ -203,7 +203,7 @@ def _channels_of(
 ) -> tuple[dict[str, NDArray[Any]], Window | None, list[str]]:
     """Return the channels of all parts by name, in the frame of the first; which pixels have data; what was changed."""
     channels: dict[str, NDArray[Any]] = {}
-    frame, common, notes = _window(parts[0].header["displayWindow"]), None, list[str]()
+    frame, windows, notes = _window(parts[0].header["displayWindow"]), list[Window](), list[str]()
     for part in parts:
         if any(key.rpartition(".")[2] in ("RY", "BY") for key in part.planes):
             raise InputError(f"{path} is stored as luminance and chroma (Y, RY, BY); convert it to R, G, B channels")
@@ -213,16 +213,7 @@ def _channels_of(
             raise InputError(f"{path} holds no pixel of its frame: the data window {data} lies beside {frame}")
         if inside != data and _CUT not in notes:
             notes.append(_CUT)
-        common = (
-            inside
-            if common is None
-            else (
-                max(common[0], inside[0]),
-                max(common[1], inside[1]),
-                min(common[2], inside[2]),
-                min(common[3], inside[3]),
-            )
-        )
+        windows.append(inside)
         prefix = "" if len(parts) == 1 or part.name.lower() in _PLAIN else f"{part.name}."
         named = len(part.planes) == 1 and part.name.rpartition(".")[2].lower() in _COLOURS  # a part for each channel
         for key, (pixels, across, down) in part.planes.items():
@@ -234,7 +225,9 @@ def _channels_of(
                 rows, columns = data[3] - data[1], data[2] - data[0]
                 pixels = np.repeat(np.repeat(pixels, down, axis=0), across, axis=1)[:rows, :columns]
             channels[name] = _framed(pixels, data, inside, frame)
-    if common is None or common == frame:
+    firsts_x, firsts_y, ends_x, ends_y = zip(*windows, strict=True)
+    common = max(firsts_x), max(firsts_y), min(ends_x), min(ends_y)
+    if common == frame:
         return channels, None, notes
     left, top, right, bottom = common[0] - frame[0], common[1] - frame[1], common[2] - frame[0], common[3] - frame[1]
     notes.append(f"data in columns {left} to {right - 1} and rows {top} to {bottom - 1} of the frame alone")

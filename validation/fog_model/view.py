@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.light_airlight import lit_parallel_rays, lit_rays
+from reference.quadrature.light_airlight import lit_rays
 from reference.quadrature.replicates import PointPlan, square_points
 from reference.quadrature.shared_samples import shared_samples
 from reference.quadrature.surface import surface_hits
@@ -77,7 +77,7 @@ class View:
                 reference, shapes = self._once(("before", area.name), lambda: before_light(reference, area))
             # Intervals by geometry are what they are: random checks only say how far to trust them.
             if isinstance(light, DirectionalLight):
-                return lit_parallel_rays(reference, light, self.distance, shapes=shapes, checks=0)
+                return lit_rays(reference, light, self.distance, shapes=shapes, checks=0)
             ball = self._ball(light, area)
             key = "near", ball.centre.tobytes(), ball.radius, shadows, None if area is None else area.name
             known = self._once(key, lambda: obstacles(reference, ball, self.distance, shapes))

@@ -37,7 +37,7 @@ from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
 from reference.scene.density_grid import GridMedium
 from reference.scene.height_fog import HeightMedium
-from reference.scene.read import ReferenceMedium, ReferenceScene, whole_scene
+from reference.scene.read import ReferenceScene, whole_scene
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.integer]
@@ -172,9 +172,6 @@ def _trace_pixels(reference: ReferenceScene, integrator, medium, pixels: slice, 
 @contextmanager
 def _grey_media(reference: ReferenceScene, channel: int, scattering: bool) -> Iterator[Any]:
     """Give all media the extinction of one channel for a while; yield the medium in which camera rays begin."""
-    if isinstance(reference.medium, ReferenceMedium) and not reference.media:
-        yield _grey_medium(reference.medium, float(reference.medium.sigma_t[channel]), scattering)
-        return
     own: list[tuple[Any, dict[str, Any]]] = []
     try:
         for medium in (reference.medium, *reference.media):
@@ -205,15 +202,3 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
         # A grey number of Mitsuba is one value, a colour three.
         parameters[key] = kind(*(float(v) for v in value)) if "Color" in kind.__name__ else kind(float(value[0]))
     parameters.update()
-
-
-def _grey_medium(medium: ReferenceMedium, sigma_t: float, scattering: bool):
-    return mi.load_dict(
-        {
-            "type": "homogeneous",
-            "sigma_t": sigma_t,
-            "albedo": {"type": "rgb", "value": [float(a) if scattering else 0.0 for a in medium.albedo]},
-            "has_spectral_extinction": False,
-            "phase": medium.plugin.phase_function(),
-        }
-    )

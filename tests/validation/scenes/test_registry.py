@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from realtime.scene.read_scene import read_scene
-from reference.quadrature.light_airlight import lit_parallel_rays
+from reference.quadrature.light_airlight import lit_rays
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_reference
 from reference.storage.scene_digest import scene_digest
@@ -103,7 +103,7 @@ def test_sun_comes_in_by_the_windows_alone(variant):
     reference = read_reference(load_scene("windows", (40, 30)).scene)
     wall = tomllib.loads(FILES[0].read_text())["windows"]["shapes"][1]
     left, front = wall["corner"][:2]
-    intervals = lit_parallel_rays(reference, reference.directional[0], surface_hits(reference).distance).lit
+    intervals = lit_rays(reference, reference.directional[0], surface_hits(reference).distance).lit
     assert intervals.transitions > 500
     assert intervals.random_checks.left == 0
     x, width = 0.5 * (intervals.low + intervals.high), intervals.high - intervals.low
