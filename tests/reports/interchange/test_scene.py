@@ -217,7 +217,7 @@ def test_describe_writes_it(variant, tmp_path):
     (tmp_path / "fog.xml").write_text(fog_xml(LAMP))
     found = airlight.describe(str(tmp_path / "fog.xml"), output=tmp_path / "fog.vol")
     assert (tmp_path / "fog.vol").exists()
-    assert "gridvolume" in found.grid
+    assert "gridvolume" in found.data["grid"]
     airlight.describe("smoke", output=tmp_path / "smoke.vol")
     assert mi.VolumeGrid(str(tmp_path / "smoke.vol")).max() == pytest.approx(4.7)
     with pytest.raises(airlight.InputError, match="the medium is no height fog and no grid"):
