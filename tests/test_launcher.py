@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
+LOCKS = ("requirements.lock", "requirements-sweep.lock", "requirements-test.lock")
 
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="the launcher is a script for POSIX shells"),
@@ -26,12 +27,17 @@ here=$(dirname "$(readlink -f "$0")")
 case "$*" in
     *"print("*) echo 3.11 ;;
     *"import ensurepip"*) [ ! -e "$here/no-ensurepip" ] ;;
-    "-m venv "*) echo venv >>"$here/log"; mkdir -p "$3/bin" && ln -s "$(readlink -f "$0")" "$3/bin/python" ;;
+    "-m venv "*) echo venv >>"$here/log"; mkdir -p "$3/bin" && ln -s "$(readlink -f "$0")" "$3/bin/python" &&
+        ln -s "$here/uv" "$3/bin/uv" ;;
     "-m pip "*) echo pip >>"$here/log"; [ ! -e "$here/pip-fails" ] ;;
     *"-m reports.machine.doctor") cat "$here/missing" 2>/dev/null || echo ;;
     -c*) true ;;
     *) printf 'ran'; for word; do printf ' <%s>' "$word"; done; echo ;;
 esac
+"""
+_UV = """#!/bin/sh
+here=$(dirname "$(readlink -f "$0")")
+echo uv >>"$here/log"; [ ! -e "$here/uv-fails" ]
 """
 _APT = """#!/bin/sh
 echo "apt-get $*" >>"$(dirname "$0")/log"
@@ -45,10 +51,11 @@ def machine(tmp_path):
     project.mkdir()
     programs.mkdir()
     shutil.copy(ROOT / "airlight", project)
-    for name in ("requirements.lock", "requirements-test.lock", "pyproject.toml", "airlight.py"):
+    for name in (*LOCKS, "pyproject.toml", "airlight.py"):
         (project / name).write_text(f"{name}\n")
     _program(programs / "python3.11", _PYTHON)
-    for name in ["sh", "cksum", "dirname", "basename", "readlink", "mkdir", "ln", "rm", "cat", "head", "tail", "flock"]:
+    _program(programs / "uv", _UV)
+    for name in ["sh", "cksum", "dirname", "basename", "readlink", "mkdir", "ln", "rm", "cat", "sed", "tee", "flock"]:
         if found := shutil.which(name):
             (programs / name).symlink_to(found)
     _program(programs / "id", "#!/bin/sh\necho 1000\n")
@@ -78,7 +85,7 @@ def test_the_first_start_installs_and_later_starts_do_not(machine):
     first = _start(machine, "report", "--scenes", "a b,c", "*")
     script = machine / "a project" / "airlight.py"
     assert (first.returncode, first.stdout) == (0, f"ran <{script}> <report> <--scenes> <a b,c> <*>\n")
-    assert _log(machine) == ["venv", "pip", "pip"]
+    assert _log(machine) == ["venv", "pip", "uv", "uv"]
     assert first.stderr.count("\n") == 1
     (machine / "link").symlink_to(machine / "a project" / "airlight")
     second = _start(machine, "--version", launcher=machine / "link")
@@ -91,30 +98,39 @@ def test_new_versions_are_installed_on_top(machine):
     _log(machine)
     (machine / "a project" / "requirements.lock").write_text("other\n")
     assert "updating" in _start(machine).stderr
-    assert _log(machine) == ["pip", "pip"]
+    assert _log(machine) == ["uv", "uv"]
 
 
-def test_the_packages_of_the_tests_wait_for_the_first_test(machine):
+def test_pip_installs_where_uv_cannot(machine):
+    (machine / "programs" / "uv-fails").touch()
+    assert _start(machine).returncode == 0
+    assert _log(machine) == ["venv", "pip", "uv", "pip", "uv", "pip"]
+
+
+@pytest.mark.parametrize("command", ["sweep", "test"])
+def test_the_packages_of_a_command_wait_for_its_first_start(machine, command):
     _start(machine, "list")
-    assert _log(machine) == ["venv", "pip", "pip"]
-    assert "packages of the tests" in _start(machine, "test", "-q").stderr
-    assert _log(machine) == ["pip"]
-    assert _start(machine, "test").stderr == _start(machine, "list").stderr == ""
+    assert _log(machine) == ["venv", "pip", "uv", "uv"]
+    assert "updating" in _start(machine, command, "-q").stderr
+    assert _log(machine) == ["uv", "uv"]
+    assert _start(machine, command).stderr == _start(machine, "list").stderr == ""
     assert _log(machine) == []
-    (machine / "a project" / "requirements-test.lock").write_text("other\n")
-    _start(machine, "test")
-    assert _log(machine) == ["pip"]
+    (machine / "a project" / f"requirements-{command}.lock").write_text("other\n")
+    _start(machine, command)
+    assert _log(machine) == ["uv", "uv"]
 
 
 def test_an_interrupted_first_start_is_repaired(machine):
     (machine / "programs" / "pip-fails").touch()
+    (machine / "programs" / "uv-fails").touch()
     failed = _start(machine)
     assert (failed.returncode, failed.stdout) == (3, "")
     assert "start again" in failed.stderr
     (machine / "programs" / "pip-fails").unlink()
+    (machine / "programs" / "uv-fails").unlink()
     _log(machine)
     assert _start(machine).returncode == 0
-    assert _log(machine) == ["venv", "pip", "pip"]
+    assert _log(machine) == ["venv", "pip", "uv", "uv"]
 
 
 def test_starts_at_the_same_time_install_once(machine):
@@ -126,7 +142,7 @@ def test_starts_at_the_same_time_install_once(machine):
     started = [subprocess.Popen([launcher, str(n)], env=environment, **pipes) for n in range(3)]
     answers = [process.communicate()[0] for process in started]
     assert [answer.split()[-1] for answer in answers] == ["<0>", "<1>", "<2>"]
-    assert _log(machine) == ["venv", "pip", "pip"]
+    assert _log(machine) == ["venv", "pip", "uv", "uv"]
 
 
 def test_a_copied_folder_and_a_python_that_has_gone_are_rebuilt(machine):

@@ -113,7 +113,7 @@ def require(package: str, extra: str, what: str) -> None:
         importlib.import_module(package)
     except ImportError:
         raise MissingError(
-            f"{what} needs the package {package}: install it with `pip install '.[{extra}]'` in a clone"
+            f"{what} needs the package {package}: run `./airlight {extra}` or `pip install '.[{extra}]'` in a clone"
         ) from None
 
 
