@@ -62,10 +62,11 @@ class LightFrame:
         return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
 
 
-def light_frames(points: Sequence[Light]) -> LightFrame:
+def light_frames(points: Sequence[Light]) -> tuple[LightFrame, Array, Array]:
     """Return light samples in one table, a lane each, so that one loop goes over them, whatever their number.
 
-    They are brought to the host together, which waits for the device once.
+    Their positions [m] and normals follow, a row each: all are brought to the host together, which waits for the device
+    once.
     """
     each = [(point.position, own.exact_normal, own.lift) for point in points if (own := point.facing)]
     numbers = host_numbers(*(value for of_point in each for value in of_point))
@@ -79,7 +80,8 @@ def light_frames(points: Sequence[Light]) -> LightFrame:
         return types.vector(*(aligned_array(types.scalar, column) for column in rows.T))
 
     up = lanes(np.cross(normal, across))
-    return LightFrame(lanes(position), lanes(across), up, lanes(normal), aligned_array(types.scalar, lift[:, 0]))
+    frames = LightFrame(lanes(position), lanes(across), up, lanes(normal), aligned_array(types.scalar, lift[:, 0]))
+    return frames, position, normal
 
 
 def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:

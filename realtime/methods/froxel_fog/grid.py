@@ -15,6 +15,7 @@ depth. What lies beyond `far` scatters nothing.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +25,6 @@ import mitsuba as mi
 from realtime.methods.interface.method import View
 from realtime.numerics.array_types import Metres, PerRay, four_numbers
 from realtime.scene.camera import Camera
-from realtime.scene.lights import Light
 from realtime.scene.media.medium import Medium, Rays
 
 _RATIO = 8  # far/near
@@ -71,9 +71,12 @@ class Grid:
         return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
 
 
-def view_grid(view: View, *, size: tuple[int, int, int], far: float) -> Grid:
-    """Return the grid of a view: froxels across, down and in depth, up to a depth [m]; 0: chosen for the frame."""
-    return Grid(*size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view))
+def view_grid(view: View, samples: Sequence[Any], *, size: tuple[int, int, int], far: float) -> Grid:
+    """Return the grid of a view: froxels across, down and in depth, up to a depth [m]; 0: chosen for the frame.
+
+    `samples`: the places of the samples of area lights [m], a lane each.
+    """
+    return Grid(*size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view, samples))
 
 
 def column_rays(view: View, grid: Grid) -> Rays:
@@ -84,7 +87,7 @@ def column_rays(view: View, grid: Grid) -> Rays:
     return rays
 
 
-def _frame_depth(view: View) -> Metres:
+def _frame_depth(view: View, samples: Sequence[Any]) -> Metres:
     """Return the depth of the farthest surface, or where rays meet none, where too little light comes from to matter.
 
     Grids, and media in vacuum, end by themselves.
@@ -98,12 +101,15 @@ def _frame_depth(view: View) -> Metres:
         return dr.maximum(dr.select(dr.all(met), dr.minimum(surfaces, last), last), 1e-3)
     beyond = Float(0)
     for light in view.lights:
-        beyond = dr.maximum(beyond, _reach(view, light, medium))
+        if light.source is None:
+            beyond = dr.maximum(beyond, _reach(view, light.position, medium))
+    for positions in samples:
+        beyond = dr.maximum(beyond, dr.max(_reach(view, positions, medium)))
     return dr.maximum(dr.select(dr.all(met), surfaces, dr.maximum(surfaces, beyond)), 1e-3)
 
 
-def _reach(view: View, light: Light, medium: Medium) -> Metres:
-    away = light.position - view.camera.origin
+def _reach(view: View, position: Any, medium: Medium) -> Metres:
+    away = position - view.camera.origin
     reach = dr.minimum(medium.length_of(_OPTICAL_REACH), _REACH * dr.norm(away))
     return dr.maximum(dr.dot(away, view.camera.forward), 0) + reach
 

@@ -100,14 +100,15 @@ class FroxelFog(Method):
 
     def _table(self, geometry, source, points, with_maps):
         """Return the points of one light."""
-        count, frames, maps = len(points), light_frames(points), None
+        count, maps = len(points), None
+        frames, _, _ = light_frames(points)
         if with_maps:
             maps = cast_hemisphere_maps(geometry, frames, count, self.point_map, for_surfaces=False)
         return LightSampleTable(source, count, frames, maps)
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
-        grid = view_grid(view, size=self.grid_size, far=self.far)
+        grid = view_grid(view, [table.frames.position for table in state.tables], size=self.grid_size, far=self.far)
         dr.eval(grid.far)
         shift = frame_shift(view) if self.noisy else (0, 0, 0)
         visible, rays = _visibility(view, state, self.shadow), column_rays(view, grid)

@@ -47,8 +47,7 @@ def source_state(
     if lights[0].facing is None:
         maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
         return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
-    frames = light_frames(lights)
-    positions, normals = (np.array(rows, dtype=np.float64).T for rows in (frames.position, frames.normal))
+    frames, positions, normals = light_frames(lights)
     # The mean square distance from the middle of a square of the side L is L^2 / 6.
     spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))
     hemispheres = None
