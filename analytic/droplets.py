@@ -32,8 +32,8 @@ and the series is the function, at any cosine. Values come from a cubic spline o
 series at sixteen angles for each of its terms; the spline differs from the series by less than 1e-8 of the value.
 
 **The modified phase function** (the paper's appendix, after Lenoble 1985) cuts the forward peak: light that a droplet
-deflects by less than 5 degrees counts as not scattered. Let f be the share of the light that is cut out of p. What is
-left is p_cut/(1 - f), of mean 1, and, so that the same light is scattered elsewhere as before,
+deflects by less than 5 degrees counts as not scattered. Let f be the fraction of the light that is cut out of p. What
+is left is p_cut/(1 - f), of mean 1, and, so that the same light is scattered elsewhere as before,
 
     kappa' = (1 - albedo f) kappa,        albedo' = albedo (1 - f)/(1 - albedo f).
 
@@ -183,8 +183,8 @@ class Optics:
         """Return the phase function [1] from sin^2 and cos^2 of half the scattering angle, arrays of one shape."""
         return self.spline(2 * np.arctan2(np.sqrt(down), np.sqrt(up)))
 
-    def share(self, low: float, high: float) -> float:
-        """Return the share of the light [1] that is scattered between two angles [degrees]."""
+    def fraction(self, low: float, high: float) -> float:
+        """Return the fraction of the light [1] that is scattered between two angles [degrees]."""
         return _integral(self, low, high)
 
 
@@ -204,7 +204,7 @@ def optics(droplets: Droplets | None = None, wavelength: float = 0.55, *, sizes:
     radius, weight = kinds.nodes(sizes or kinds.sizes)
     x = 2 * np.pi * radius / wavelength
     count = terms(float(x[-1]))
-    nodes, shares = np.polynomial.legendre.leggauss(2 * count + 1)
+    nodes, fractions = np.polynomial.legendre.leggauss(2 * count + 1)
     blocks = [(part, *coefficients(x[part], m)) for part in np.array_split(np.arange(len(x)), _BLOCKS)]
     extinction = scattering = 0.0
     for part, a, b in blocks:
@@ -217,7 +217,7 @@ def optics(droplets: Droplets | None = None, wavelength: float = 0.55, *, sizes:
         pi, tau = angular_functions(nodes[chosen], count)
         # An intensity is 2 (|S_1|^2 + |S_2|^2)/(x^2 Q_sca) with weights Q_sca: the sizes' own Q_sca cancels.
         phase[chosen] = sum(2 * (weight[part] / x[part] ** 2) @ intensities(a, b, pi, tau) for part, a, b in blocks)
-    return Optics(kinds, wavelength, m, extinction, scattering, _moments(nodes, shares, phase, 2 * count))
+    return Optics(kinds, wavelength, m, extinction, scattering, _moments(nodes, fractions, phase, 2 * count))
 
 
 @dataclass(frozen=True)
@@ -230,8 +230,8 @@ class Modified:
 
     @cached_property
     def removed(self) -> float:
-        """The share of the light that is cut out of the phase function, and by which the density is lowered [1]."""
-        return self.full.share(0, self.angle)
+        """The fraction of the light that is cut out of the phase function, and by which the density is lowered [1]."""
+        return self.full.fraction(0, self.angle)
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
         """Return the phase function [1] at cosines of the scattering angle, of any shape; its mean is 1."""

@@ -12,7 +12,7 @@ Value = TypeVar("Value")
 
 
 class InputError(ValueError):
-    """An input that cannot be used: the user mends it, and it is not a fault of the program.
+    """An input that cannot be used: the user repairs it, and it is not a fault of the program.
 
     The message is one line that says what was given, what is wanted and what to do. The command line prints it
     without a traceback and exits with status 2.

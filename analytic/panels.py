@@ -7,7 +7,7 @@ free of cancellation and of overflow:
     J = (1/h) int_{w0}^{w1} exp(-sigma_t (foot + h E)) p(cos) 2E/(1 + E^2) dw
     (1 + cos)/2 = 1/(1 + E^2),      (1 - cos)/2 = E^2/(1 + E^2).
 
-A leg from the light that counts only s times in the exponent (`shadow_scale`) turns x + r into x + s r, that is
+A segment from the light that counts only s times in the exponent (`shadow_scale`) turns x + r into x + s r, that is
 
     foot + h (E - 1/E)/2 + s h (E + 1/E)/2  =  foot + h ((1 + s)/2 E - (1 - s)/2 1/E).
 
@@ -87,8 +87,8 @@ def airlight_segments(
 
     `foot`, `height`: signed distance of the foot point and distance between light and ray [m]; numbers or shape (N,).
     `x0`, `x1`: ends of the segments along the ray [m], x0 <= x1; x1 may be infinite. `sigma_t`: extinction coefficient
-    [1/m], >= 0. `phase`: phase function, the same for all segments. `shadow_scale`: s in [0, 1]: the light's leg counts
-    s times in the exponent, exp(-sigma_t (x + s r)), as in a renderer that attenuates over shortened shadow rays
+    [1/m], >= 0. `phase`: phase function, the same for all segments. `shadow_scale`: s in [0, 1]: the light's segment
+    counts s times in the exponent, exp(-sigma_t (x + s r)), as in a renderer that attenuates over shortened shadow rays
     (DESIGN section 6.1). `weight`: relative intensity of the light: called as weight(x, index) with distances x of
     shape (m, 7) or (m, 21) [m] and the row numbers of their segments, shape (m,); returns an array of the shape of x.
     Where it has kinks, cut the segments there, otherwise the panels around them are halved many times. `rtol`: relative
@@ -214,8 +214,8 @@ def adapted(
         missed = _summed(owner, panels.error, count) > allowed
         if not missed.any():
             break
-        share = (allowed.T / np.maximum(np.bincount(owner, minlength=count), 1)).T
-        misses = missed[owner] & (panels.error > share[owner]) & (panels.error > panels.noise)
+        fraction = (allowed.T / np.maximum(np.bincount(owner, minlength=count), 1)).T
+        misses = missed[owner] & (panels.error > fraction[owner]) & (panels.error > panels.noise)
         halve = np.any(misses.reshape(len(misses), -1), axis=1)
         if not halve.any():
             break

@@ -183,8 +183,8 @@ class PhaseFunction:
         mean = (mp.fsum(values) - (values[0] + values[last]) / 2) / last
         position = (1 + c) / 2 * last
         cell = min(max(int(mp.floor(position)), 0), last - 1)
-        share = position - cell
-        return (values[cell] * (1 - share) + values[cell + 1] * share) / mean
+        fraction = position - cell
+        return (values[cell] * (1 - fraction) + values[cell + 1] * fraction) / mean
 
     @property
     def _scattering(self) -> Optics | Modified:

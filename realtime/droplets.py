@@ -76,8 +76,8 @@ class DropletSeries:
         k = np.arange(len(self.cosines))
         return -np.sin(np.outer(angle, k)) @ (k * self.cosines)
 
-    def share_below(self, angle: float) -> float:
-        """Return the share of the light [1] that is scattered by less than an angle [rad].
+    def fraction_below(self, angle: float) -> float:
+        """Return the fraction of the light [1] that is scattered by less than an angle [rad].
 
         It is (1/2) int_0^angle p sin: of cos(k t) sin t the integral is that of (sin((k + 1) t) - sin((k - 1) t))/2.
         """
@@ -119,8 +119,8 @@ def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 
     for start in range(0, len(angle), _CHUNK):
         plus, minus = angular_factors(np.cos(angle[start : start + _CHUNK]), most)
         for part, a, b in groups:
-            share = weight[part] / size[part] ** 2
-            values[start : start + _CHUNK] += _scattered(share, a + b, plus) + _scattered(share, a - b, minus)
+            fraction = weight[part] / size[part] ** 2
+            values[start : start + _CHUNK] += _scattered(fraction, a + b, plus) + _scattered(fraction, a - b, minus)
     cosines = dct(values, type=1) / (len(values) - 1)
     cosines[[0, -1]] *= 0.5
     even = np.arange(0, len(cosines), 2)
@@ -142,11 +142,11 @@ def _grouped(count: int) -> list[NDArray[np.int64]]:
     return np.array_split(np.arange(count), _GROUPS)
 
 
-def _scattered(share: Array, coefficients: NDArray[np.complex128], factors: Array) -> Array:
+def _scattered(fraction: Array, coefficients: NDArray[np.complex128], factors: Array) -> Array:
     """Return the sum over the sizes of share |amplitude|^2, (angles,)."""
     used = factors[: coefficients.shape[1]]
     real, imaginary = (np.ascontiguousarray(part) @ used for part in (coefficients.real, coefficients.imag))
-    return share @ (real * real + imaginary * imaginary)
+    return fraction @ (real * real + imaginary * imaginary)
 
 
 Complex = NDArray[np.complex128]
@@ -255,6 +255,6 @@ def droplet_table(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0
     return DropletTable(np.stack([values, slopes], axis=1).ravel(), float(np.tan(0.5 * half)), len(series.cosines))
 
 
-def share_cut(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> float:
-    """Return the share of the light [1] below `CUT`, which the modified phase function lacks."""
-    return droplet_series(radius, gamma, wavelength).share_below(np.deg2rad(CUT))
+def fraction_cut(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 0.55) -> float:
+    """Return the fraction of the light [1] below `CUT`, which the modified phase function lacks."""
+    return droplet_series(radius, gamma, wavelength).fraction_below(np.deg2rad(CUT))

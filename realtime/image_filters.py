@@ -175,14 +175,14 @@ class Taps:
             exponent = dr.fma(-falloff(width) * difference, difference, exponent)
         if self.wide.inside is not None:
             # Of a number the weight is a number: then a tap costs no exponential.
-            share = dr.gather(Float, self.wide.inside, place) * weight(exponent)
+            fraction = dr.gather(Float, self.wide.inside, place) * weight(exponent)
         else:
-            share = weight(exponent)
+            fraction = weight(exponent)
         sums = [
-            dr.fma(share, dr.gather(Float, channel, place) - middle, so_far)
+            dr.fma(fraction, dr.gather(Float, channel, place) - middle, so_far)
             for channel, middle, so_far in zip(self.wide.values, self.here, sums, strict=True)
         ]
-        return total + share, sums
+        return total + fraction, sums
 
     def filtered(self, kind: Any, total: Any, sums: list[Any]) -> Any:
         """Return the image that the sums make, of the type `kind`."""
@@ -292,7 +292,7 @@ def bilateral_of_levels(
     what they are.
     """
     r = reach(hd, support)
-    shares = [math.exp(-0.5 * (offset / hd) ** 2) for offset in range(r + 1)]
+    fractions = [math.exp(-0.5 * (offset / hd) ** 2) for offset in range(r + 1)]
     Float = type(image)
 
     def gaussians(channels: list[Any], step: int, place: Any, of: Any) -> list[Any]:
@@ -300,7 +300,7 @@ def bilateral_of_levels(
         for offset in range(1, r + 1):
             for side in (place + offset * step, place - offset * step):
                 for level, channel in enumerate(channels):
-                    sums[level] = dr.fma(shares[offset], of(level, dr.gather(Float, channel, side)), sums[level])
+                    sums[level] = dr.fma(fractions[offset], of(level, dr.gather(Float, channel, side)), sums[level])
         return sums
 
     # A pixel of the image holds its level plus 1; the margin holds 0, which is no level.
@@ -316,9 +316,9 @@ def bilateral_of_levels(
     total, change = Float(0), Float(0)
     for level, count in enumerate(counts):
         difference = level / levels - image
-        share = count if math.isinf(hr) else count * weight(-falloff(hr) * dr.square(difference))
-        total += share
-        change = dr.fma(share, difference, change)
+        fraction = count if math.isinf(hr) else count * weight(-falloff(hr) * dr.square(difference))
+        total += fraction
+        change = dr.fma(fraction, difference, change)
     return dr.select(there, image + change / total, image)
 
 
@@ -368,10 +368,10 @@ def upsample(
         for at_column, horizontal in ((left, 1 - x), (right, x)):
             place = at_row * raster.width + at_column
             difference = dr.gather(Float, small_guide.values, place) - guide
-            share = vertical * horizontal * weight(-falloff(small_guide.width) * dr.square(difference))
-            total += share
+            fraction = vertical * horizontal * weight(-falloff(small_guide.width) * dr.square(difference))
+            total += fraction
             sums = [
-                dr.fma(share, dr.gather(Float, channel, place), so_far)
+                dr.fma(fraction, dr.gather(Float, channel, place), so_far)
                 for channel, so_far in zip(channels(small), sums)
             ]
             nearer = dr.abs(difference) < least

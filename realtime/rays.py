@@ -39,9 +39,9 @@ w/h are three unit vectors at right angles, so with across = a . w
 
     axial^2 + (offset/h)^2 + (across/h)^2 = 1,     hence     D = h^2 sin^2 - across^2.
 
-One difference is left, zero where the ray is tangent. A share e of h^2 that rounding adds to it changes a chord that is
-sqrt(e) of the distance from nothing to that: half of float64's digits are lost there, and float32 has its own. A common
-factor of d is one of h and across both.
+One difference is left, zero where the ray is tangent. A fraction e of h^2 that rounding adds to it changes a chord that
+is sqrt(e) of the distance from nothing to that: half of float64's digits are lost there, and float32 has its own. A
+common factor of d is one of h and across both.
 
 **The roots.** The end where A s + B > 0 is where the ray enters the cone, the other where it leaves it,
 

@@ -169,8 +169,8 @@ def _scene(record: Any, kept: KeptScene | None) -> str:
 def cycles() -> str:
     """Return the faults that were set in Blender's Cycles, and what the diagnosis said of each."""
     record = json.loads((DATA / "cycles-faults.json").read_text(encoding="utf-8"))
-    faults = [row for row in record["rows"] if row["planted"] != "right"]
-    right = [row for row in record["rows"] if row["planted"] == "right"]
+    faults = [row for row in record["rows"] if row["injected"] != "right"]
+    right = [row for row in record["rows"] if row["injected"] == "right"]
     said = (
         f"{sum(row['right'] for row in faults)} of {len(faults)} faults are named first; "
         f"{sum(row['right'] for row in right)} of {len(right)} right images are called right ({record['measured']}, "
@@ -202,4 +202,4 @@ def _diagnosed(row: dict[str, Any]) -> list[str]:
     first = f"`{row['first']}`" if row["right"] else f"**`{row['first']}`**"
     says = row["says"] + (f" (with {' and '.join(row['together'])})" if row["together"] else "")
     errors = (f"{100 * row[key]:.2g} %" for key in ("residual", "left"))
-    return [row["words"], f"`{row['planted']}`", first, says, *errors]
+    return [row["words"], f"`{row['injected']}`", first, says, *errors]

@@ -3,9 +3,9 @@
 
 `airlight render fireflies --size 64x48 --method docs/examples/reservoirs.py:Reservoirs --set candidates=16 -o fog.png`
 
-A candidate y is a light, taken by its power with the probability q, and an even share of the angle at it. With f(y) its
-radiance without shadows, its weight is w = |f(y)| / q, |f| the mean of the channels. The reservoir keeps a candidate
-with the probability w over the sum of all weights so far, and in the end
+A candidate y is a light, taken by its power with the probability q, and an even fraction of the angle at it. With f(y)
+its radiance without shadows, its weight is w = |f(y)| / q, |f| the mean of the channels. The reservoir keeps a
+candidate with the probability w over the sum of all weights so far, and in the end
 
     L = f(y) V(y) / |f(y)|  (1/M) sum of the M weights,        V the visibility,
 
@@ -61,8 +61,8 @@ class Reservoirs(airlight.Method):
         like = view.lights[table.first]
 
         def step(number, weights, kept, at):
-            share, place, coin, _ = view.uniform(stream + number)
-            light, probability = table.pick(share)
+            fraction, place, coin, _ = view.uniform(stream + number)
+            light, probability = table.pick(fraction)
             color, _ = unshadowed(view, table.light(light, like), place)
             weight = dr.mean(color) / probability
             weights = weights + weight

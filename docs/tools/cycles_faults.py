@@ -42,7 +42,9 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="print the faults as JSON")
     chosen = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else None)
     if chosen.list:
-        print(json.dumps({name: {"planted": planted, "words": words} for name, (planted, words, _) in FAULTS.items()}))
+        print(
+            json.dumps({name: {"injected": injected, "words": words} for name, (injected, words, _) in FAULTS.items()})
+        )
         return
     os.makedirs(chosen.folder, exist_ok=True)
     for name in chosen.faults or FAULTS:
@@ -190,7 +192,7 @@ def turned(properties: Properties) -> None:
 
 
 def shifted(pixels: float) -> Callable[[Properties], None]:
-    """Move the film to the right, by a share of its width."""
+    """Move the film to the right, by a fraction of its width."""
     return lambda properties: properties["camera"]["data"].update(
         shift_x=pixels / properties["scene"]["render.resolution_x"]
     )

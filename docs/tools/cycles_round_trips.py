@@ -32,7 +32,7 @@ def answers(
     name
         Of `SCENES`.
     folder
-        Of its images; `faults.json` beside it says what was planted, if `python` is None.
+        Of its images; `faults.json` beside it says what was injected, if `python` is None.
     python
         An interpreter that has `bpy`; None: only images that are there are diagnosed.
     samples
@@ -64,7 +64,7 @@ def answers(
             "fault": fault,
             **said,
             "first": diagnosis.first,
-            "right": diagnosis.first == said["planted"],
+            "right": diagnosis.first == said["injected"],
             "says": first.words,
             "together": list(first.together),
             "residual": diagnosis.residual,

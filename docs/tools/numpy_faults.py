@@ -60,7 +60,7 @@ class Engine:
     planar: bool = False
     power: float = 2.0
     reach: float = math.inf
-    legs: tuple[float, float] = (1.0, 1.0)  # to the camera, from the light
+    segments: tuple[float, float] = (1.0, 1.0)  # to the camera, from the light
     moved: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of the first lamp, in the fog
     shifted: tuple[float, float] = (0.0, 0.0)  # of the fog [pixels]
     mixed: Callable[[Array, Array, Array], Array] = lambda fog, surface, left: fog + surface
@@ -185,12 +185,12 @@ def _layers(engine: Engine, positions: Array) -> tuple[Array, Array, Array]:
     normal = np.where((ball < floor)[:, None], (point - BALL) / RADIUS, [0, 0, 1.0])
     colour = np.where((ball < floor)[:, None], engine.ball, engine.floor)
     length = np.maximum(last - engine.start, 0)
-    left = np.where(hit, np.exp(-engine.legs[0] * _depth(engine, ORIGIN[2] + 0 * last, point[:, 2], length)), 0)
+    left = np.where(hit, np.exp(-engine.segments[0] * _depth(engine, ORIGIN[2] + 0 * last, point[:, 2], length)), 0)
     surface, fog = np.zeros((len(way), 3)), np.zeros((len(way), 3))
     for lamp in engine.lamps:
         sent, to, r = _light(engine, lamp, point + 1e-7 * normal, engine.shadows[1])
         falls = sent * np.maximum(np.sum(normal * to, axis=1), 0) * hit
-        falls = falls * left * np.exp(-engine.legs[1] * _depth(engine, point[:, 2], lamp.place[2] + 0 * r, r))
+        falls = falls * left * np.exp(-engine.segments[1] * _depth(engine, point[:, 2], lamp.place[2] + 0 * r, r))
         surface += falls[:, None] * colour / math.pi * lamp.intensity
     for number, given in enumerate(engine.lamps):
         lamp = replace(given, place=tuple(np.add(given.place, engine.moved))) if number == 0 else given
@@ -204,8 +204,8 @@ def _layers(engine: Engine, positions: Array) -> tuple[Array, Array, Array]:
             size = height / np.cos(angle) ** 2 * (ends[1] - ends[0]) / engine.steps
             here = ORIGIN + x[:, None] * way
             sent, to, r = _light(engine, lamp, here, engine.shadows[0])
-            depth = engine.legs[0] * _depth(engine, ORIGIN[2] + 0 * x, here[:, 2], np.maximum(x - engine.start, 0))
-            depth = depth + engine.legs[1] * _depth(engine, here[:, 2], lamp.place[2] + 0 * r, r)
+            depth = engine.segments[0] * _depth(engine, ORIGIN[2] + 0 * x, here[:, 2], np.maximum(x - engine.start, 0))
+            depth = depth + engine.segments[1] * _depth(engine, here[:, 2], lamp.place[2] + 0 * r, r)
             value = (
                 sent
                 * engine.phase(np.sum(to * way, axis=1))
@@ -255,8 +255,8 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("phase", "an isotropic phase function", {"phase": lambda c: np.ones_like(c)}),
     ("phase", "Schlick's phase function, k = g", {"phase": lambda c: (1 - 0.35**2) / (1 - 0.35 * c) ** 2}),
     ("phase", "Rayleigh's phase function", {"phase": lambda c: 0.75 * (1 + c * c)}),
-    ("light-path", "the way from the light not attenuated", {"legs": (1.0, 0.0)}),
-    ("camera-path", "the way to the camera not attenuated", {"legs": (0.0, 1.0)}),
+    ("light-path", "the way from the light not attenuated", {"segments": (1.0, 0.0)}),
+    ("camera-path", "the way to the camera not attenuated", {"segments": (0.0, 1.0)}),
     ("near-plane", "no fog before 0.5 m", {"start": 0.5}),
     ("fog-end", "no fog beyond 6 m", {"end": 6.0}),
     ("depth-axis", "depth along the axis", {"planar": True}),
@@ -286,7 +286,7 @@ FAULTS_OF_LAYERS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("scale-height", "density halves in the scale height", {"layer": (0.2, 1.3 / math.log(2))}),
     ("scale-height", "the scale height 1.8 times", {"layer": (0.2, 1.8 * 1.3)}),
     ("height-fog", "the scale height 0.7 times, and the base 0.6 m too high", {"layer": (0.8, 0.7 * 1.3)}),
-    ("camera-path", "the way to the camera not attenuated, in height fog", {"legs": (0.0, 1.0)}),
+    ("camera-path", "the way to the camera not attenuated, in height fog", {"segments": (0.0, 1.0)}),
 )
 CASES = (*((RIGHT, *fault) for fault in FAULTS), *((LAYERED, *fault) for fault in FAULTS_OF_LAYERS))
 
@@ -318,7 +318,7 @@ def main() -> None:
             scenes[engine] = loaded, SceneLight(read_reference(loaded.scene))
     old = json.loads(RECORD.read_text(encoding="utf-8"))["rows"] if RECORD.exists() else []
     rows = {row["number"]: row for row in old}
-    for number, (engine, planted, words, given) in enumerate(CASES):
+    for number, (engine, injected, words, given) in enumerate(CASES):
         if chosen.only and number not in chosen.only:
             continue
         area = number % 2 == 1
@@ -327,11 +327,11 @@ def main() -> None:
         said = diagnose_image(Image({"total": image}), loaded, light=light)
         rows[number] = {
             "number": number,
-            "planted": planted,
+            "injected": injected,
             "words": words,
             "pixel": "area" if area else "centre",
             "first": said.first,
-            "right": said.first == planted,
+            "right": said.first == injected,
             "pixel_found": said.pixel,
             "says": said.ranked[0].words if said.first != "unexplained" else f"the error lies {said.place}",
             "together": list(said.ranked[0].together),

@@ -107,7 +107,8 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
     size = dr.maximum(dr.maximum(dr.abs(origin.x), dr.abs(origin.y)), dr.abs(origin.z))
     begin = dr.select(x > 0, x + _STEP * (x + size), 0)
     start = mi.Point3f(origin + direction * begin)
-    # Camera rays and legs side by side start close together and go alike: told so, Embree takes a third of the time.
+    # Camera rays and segments side by side start close together and go alike: told so, Embree takes a third of the
+    # time.
     ray = mi.Ray3f(start, mi.Vector3f(direction))
     hit = surfaces.geometry.ray_intersect_preliminary(ray, coherent=True, active=active)
     valid = hit.is_valid() & active

@@ -49,15 +49,15 @@ to p: where both are large it is no contraction, and steps overshoot.
   last one is negative). The mean of the map and the identity with the weight w has the slope 1 - w (1 - s), which is
   within (-1, 1) for every s from 1 - 2/w on: -3 for w = 1/2, -7 for 1/4.
 * *Start*. c = p, and sigma so large that the whole lit surface is one plane; or the collector of the last frame.
-* *Cover*. Light enters where there is cloud. Of the collector's width the share A of the filtered map is cloud, so the
-  light of the slab, whose face has no end, counts A times; the paper counts it whole.
+* *Cover*. Light enters where there is cloud. Of the collector's width the fraction A of the filtered map is cloud, so
+  the light of the slab, whose face has no end, counts A times; the paper counts it whole.
 * *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu| upwards,
   (t - d)/mu downwards. Light that was scattered into the ray on the way T, not L, is what the eye gets: it counts
   (1 - exp(-T))/(1 - exp(-L)) times, as if its source were even. Where the ray leaves the slab through the lit face
   (mu < 0), p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin parts are
   too bright, and slopes that face away from the sun are black.
-* *End*. After `iterations` steps; or in those rays that take no more than a share `settled` of sigma as their step. The
-  light is that of the last slab: F gives it with the place and the width.
+* *End*. After `iterations` steps; or in those rays that take no more than a fraction `settled` of sigma as their step.
+  The light is that of the last slab: F gives it with the place and the width.
 
 The distance |F - c'| / sigma of the last step says how far the search is from its end: `CollectorLight.missed`.
 
@@ -239,8 +239,8 @@ def collector_light(
         way = wanted - projected
         distance = dr.norm(way)
         weight = dr.select(dr.dot(way, last) < 0, 0.5 * weight, weight)
-        share = dr.minimum(weight, new_width / dr.maximum(distance, 1e-20))
-        moved = dr.fma(way, share, projected)
+        fraction = dr.minimum(weight, new_width / dr.maximum(distance, 1e-20))
+        moved = dr.fma(way, fraction, projected)
         relative = distance / new_width
         return index + 1, relative > search.settled, moved, new_width, way, weight, found, relative
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""How much of a cloud lies between a sun and a point, in a map: what a leg of single scattering looks up.
+r"""How much of a cloud lies between a sun and a point, in a map: what a segment of single scattering looks up.
 
 A ray of the light through each texel marches through a cloud. It keeps l = int rho dx, in metres of full density, at
 layers whose heights lie
@@ -9,8 +9,8 @@ layers whose heights lie
 between the first and the last place of the ray with any density: narrow where the light comes in and much of it is
 left, wide behind. A look-up is linear in k between two layers, and between the four nearest texels, each with its own
 front and back. That is a deep shadow map (Lokovic and Veach 2000), which the paper names as its future work: a depth
-map alone takes the way from the first surface for cloud of one density, without wisps and gaps. The depth of a leg is
-sigma_t l, so that other extinctions need no new map.
+map alone takes the way from the first surface for cloud of one density, without wisps and gaps. The depth of a segment
+is sigma_t l, so that other extinctions need no new map.
 """
 
 from collections.abc import Sequence
@@ -52,8 +52,8 @@ class LightDepths:
             for along, weight_along in ((0, 1 - x), (1, x)):
                 texel = (row + down) * SIZE + column + along
                 front, back = (dr.gather(Float, own, texel, active) for own in (self.front, self.back))
-                share = dr.clip((front - height) / dr.maximum(front - back, 1e-20), 0, 1)
-                layer, between = cell_of(dr.sqrt(share) * LAYERS, LAYERS + 1)
+                fraction = dr.clip((front - height) / dr.maximum(front - back, 1e-20), 0, 1)
+                layer, between = cell_of(dr.sqrt(fraction) * LAYERS, LAYERS + 1)
                 first = texel * (LAYERS + 1) + layer
                 near, far = (dr.gather(Float, self.lengths, place, active) for place in (first, first + 1))
                 total = dr.fma(weight_down * weight_along, dr.lerp(near, far, between), total)
@@ -106,8 +106,8 @@ def light_depths(
         rho = middle_density(clouds, origin, direction, begin, end, number)
         length = dr.select(own, dr.fma(rho, end - begin, length), length)
         # A step ends at a layer's end at the latest, or a rounding of the distance behind it.
-        share = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
-        reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(share), LAYERS, 1e-3)), LAYERS)
+        fraction = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
+        reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(fraction), LAYERS, 1e-3)), LAYERS)
         # What the next layer has if the ray leaves the cloud before it; a later step writes over it.
         dr.scatter(lengths, length, texel * (LAYERS + 1) + dr.minimum(reached + 1, LAYERS), own)
         dr.scatter(lengths, length, texel * (LAYERS + 1) + reached, own & (reached > layer))

@@ -35,7 +35,7 @@ and what lies between two levels is linear in l.
 
 *Holes*. Where all texels that are read have A = 0 there is no mean. So a texel without cloud takes what its parent
 holds, with the weight `HOLE`: a look-up beside the cloud finds what is nearest to it, from the finest level that holds
-anything of the cloud, and a look-up at the cloud is changed by a share of `HOLE` at most. Holes are filled when all
+anything of the cloud, and a look-up at the cloud is changed by a fraction of `HOLE` at most. Holes are filled when all
 levels are there, from the coarsest down, so that no mean counts them.
 """
 
@@ -117,7 +117,7 @@ class LightMap:
 class FilteredSurface:
     """The lit surface near some points, filtered."""
 
-    cover: Any  #: share of the filter's width in which there is cloud; about `HOLE` or less where there is none
+    cover: Any  #: fraction of the filter's width in which there is cloud; about `HOLE` or less where there is none
     middle: Any  #: the middle of that part of the surface [m]
     thickness: Any  #: from the first to the last surface, along the light [m]
     normal: Any  #: of unit length, towards the light
@@ -256,11 +256,11 @@ def filtered_surface(light_map: LightMap, point, width: Metres) -> FilteredSurfa
     level = dr.clip(dr.log2(dr.maximum(2 * width / light_map.texel, 1)), 0, light_map.levels - 1)
     fine = dr.minimum(mi.UInt32(level), light_map.levels - 1)
     coarse = dr.minimum(fine + 1, light_map.levels - 1)
-    share = level - Float(fine)
+    fraction = level - Float(fine)
     place = map_place(light_map, point)
     sums = [_at_level(light_map, place, number) for number in (fine, coarse)]
-    cover, front, back, u = dr.lerp(sums[0][0], sums[1][0], share)
-    *normal, v = dr.lerp(sums[0][1], sums[1][1], share)
+    cover, front, back, u = dr.lerp(sums[0][0], sums[1][0], fraction)
+    *normal, v = dr.lerp(sums[0][1], sums[1][1], fraction)
     inverse = dr.rcp(cover)
     assert light_map.projection.basis is not None
     across, up, axis = light_map.projection.basis
@@ -269,7 +269,7 @@ def filtered_surface(light_map: LightMap, point, width: Metres) -> FilteredSurfa
 
 
 def shade(light_map: LightMap, point, width: Metres) -> tuple[PerRay, Metres]:
-    """Return the share of a filter's width over which a cloud lies, and how much of it is above the points [m].
+    """Return the fraction of a filter's width over which a cloud lies, and how much of it is above the points [m].
 
     Parameters are those of `filtered_surface`; above is where the light comes from, and the length along it.
     """
@@ -320,8 +320,8 @@ def _neighbours(place: PerRay, side: PerRay, Float: Any) -> tuple[tuple[PerRay, 
     """Return the numbers of the texels on both sides of u or v, and their weights."""
     position = dr.clip(dr.fma(0.5 * Float(side), place + 1, -0.5), 0, Float(side) - 1)
     lower = dr.minimum(mi.UInt32(position), side - 1)
-    share = position - Float(lower)
-    return (lower, 1 - share), (dr.minimum(lower + 1, side - 1), share)
+    fraction = position - Float(lower)
+    return (lower, 1 - fraction), (dr.minimum(lower + 1, side - 1), fraction)
 
 
 def _texels_before(size: int, level: Any) -> Any:

@@ -72,9 +72,9 @@ def dense_surface(
         second = density.at(origin + direction * finish, cloud, searches)
         at_once = searches & (first > threshold)
         passes = searches & ~at_once & (second > threshold)
-        share = dr.select(passes, (threshold - first) / (second - first), 0)
+        fraction = dr.select(passes, (threshold - first) / (second - first), 0)
         met = at_once | passes
-        distance = dr.select(met, begin + share * (finish - begin), distance)
+        distance = dr.select(met, begin + fraction * (finish - begin), distance)
         number = dr.select(met, cloud, number)
         if only is None:
             return (distance, number, behind), ~met

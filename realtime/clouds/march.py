@@ -3,7 +3,7 @@ r"""Steps of rays through clouds, and optical depths.
 
 A step of the length dx has the density in its middle, rho, and the depth kappa rho dx: the midpoint rule, whose error
 falls with dx^2. In a grid steps start as long as a voxel, and grow with the depth tau to the eye like exp(tau/s), s =
-`SPREAD`: what lies behind tau shows with exp(-tau), so all steps have about the same share in what is wrong of it. A
+`SPREAD`: what lies behind tau shows with exp(-tau), so all steps have about the same fraction in what is wrong of it. A
 homogeneous cloud is one of density 1, without voxels: its stretches are the steps.
 """
 
@@ -123,25 +123,25 @@ def depths_along(
     return march(surfaces, origin, direction, end, nothing, step=step, add=add, active=active, first=first)
 
 
-def leg_through(
+def segment_through(
     surfaces: CloudSurfaces, clouds: Clouds, light: Light, *, stride: Any
 ) -> Callable[[Any, Any], tuple[Any, ...]]:
-    """Return the function from points [m] and active lanes to the depths of the legs from a light."""
+    """Return the function from points [m] and active lanes to the depths of the segments from a light."""
 
-    def leg(point, active):
+    def segment(point, active):
         end = type(point.x)(dr.inf)
         return depths_along(surfaces, clouds, point, -light.axis, end, stride=stride, seen=False, active=active)
 
-    return leg
+    return segment
 
 
-def leg_by_lengths(clouds: Clouds, lengths: Any) -> Callable[[Any, Any], tuple[Any, ...]]:
-    """Return the function from points [m] and active lanes to the depths of legs by channel.
+def segment_by_lengths(clouds: Clouds, lengths: Any) -> Callable[[Any, Any], tuple[Any, ...]]:
+    """Return the function from points [m] and active lanes to the depths of segments by channel.
 
-    `lengths`: by cloud a function (point, active) -> how much of it lies on the leg, at its full density [m].
+    `lengths`: by cloud a function (point, active) -> how much of it lies on the segment, at its full density [m].
     """
 
-    def leg(point, active):
+    def segment(point, active):
         Float = type(point.x)
         depths = [Float(0) for _ in clouds.sigma_t]
         for cloud, length_to in enumerate(lengths):
@@ -150,7 +150,7 @@ def leg_by_lengths(clouds: Clouds, lengths: Any) -> Callable[[Any, Any], tuple[A
             depths = [dr.fma(kappa, length, depth) for kappa, depth in zip(kappas, depths)]
         return tuple(depths)
 
-    return leg
+    return segment
 
 
 def least(depths: tuple[Any, ...]) -> Any:

@@ -7,9 +7,9 @@ N steps of a ray of the depth T in clouds end at
 
     tau_k = -s log(1 - (k/N) (1 - exp(-T/s))),        k = 1 .. N,        tau_N = T:
 
-equal shares of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own extinction; light that
-is extinguished less on its way in than on the way out needs nodes further in, so that s is larger. From a node at the
-depth tau the next is -s log(1 - exp(tau/s) (1 - exp(-T/s))/N) away.
+equal fractions of the integral of exp(-tau/s). With s = 1 each step takes as much of the ray's own extinction; light
+that is extinguished less on its way in than on the way out needs nodes further in, so that s is larger. From a node at
+the depth tau the next is -s log(1 - exp(tau/s) (1 - exp(-T/s))/N) away.
 
 In a grid of densities T is the depth that the ray had if they were 1 everywhere, and the next node is at most so far
 away at full density. No step is longer than those of `realtime.clouds.march`, which see the voxels.
@@ -29,7 +29,7 @@ exponent has the local kappa times the whole distance instead of the depth cumul
 is negative, and more light comes out than went in; x is counted from where the ray enters the first cloud. In a grid
 kappa is that in the middle of a step.
 
-**Single scattering in clouds, by steps on which the legs of the light are linear.**
+**Single scattering in clouds, by steps on which the segments of the light are linear.**
 
 Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x), and the eye after
 tau(x) more; of phase function P/4 pi and albedo w,
@@ -41,11 +41,11 @@ On a step u = tau + l is linear between two nodes, du = kappa dx + dl, so that w
     int kappa exp(-u) dx = kappa dx/(kappa dx + dl) (e_i - e_{i+1}),
 
 and kappa dx e where dl = -kappa dx. Printed (Bouthors 2008, eq. 1) are the other sign and no factor: e_{i+1} - e_i.
-In a polyhedron l is linear between kinks and jumps, where rays and legs cross edges, so the error is that of the steps
-with one of these in them.
+In a polyhedron l is linear between kinks and jumps, where rays and segments cross edges, so the error is that of the
+steps with one of these in them.
 
-Octaves of a light (`realtime.methods.cloud_octaves`) have the leg a l with a factor a each, and a phase function each:
-the same sum with u = tau + a l.
+Octaves of a light (`realtime.methods.cloud_octaves`) have the segment a l with a factor a each, and a phase function
+each: the same sum with u = tau + a l.
 
 **The background of clouds:** surfaces that light reaches through clouds, and a sky.
 """
@@ -64,16 +64,16 @@ from realtime.numerics.functions import exp_bounded, exp_expm1_bounded
 from realtime.scene.lights import Light
 from realtime.scene.media.bounded import Clouds
 
-_LAST = 1.0001  # times the share of a step: rounding leaves none behind the last
+_LAST = 1.0001  # times the fraction of a step: rounding leaves none behind the last
 
 
 def opacity_of(depths: tuple[Any, ...], Color) -> Any:
     """Return 1 - exp(-depth) as a colour, from optical `depths` by channel [1]; `Color` is its type."""
     # 1 - exp(-d) = 2 exp(-d/2) sinh(d/2) loses nothing where d is small.
-    shares = [
+    fractions = [
         dr.select(depth < 0.1, 2 * dr.exp(-0.5 * depth) * dr.sinh(0.5 * depth), 1 - dr.exp(-depth)) for depth in depths
     ]
-    return Color(*shares)
+    return Color(*fractions)
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,10 @@ class Beam:
     """A light from infinity as points in clouds see it."""
 
     irradiance: Any  #: across the beam, RGB [W/m^2]
-    scales: tuple[Any, ...]  #: by octave, of the depths of its legs [1]
+    scales: tuple[Any, ...]  #: by octave, of the depths of its segments [1]
     phases: tuple[tuple[Any, ...], ...]  #: by octave and by phase function of the clouds, its value on the rays, mean 1
-    #: (point [m], active) -> the depth of the leg to a point, by channel [1]
-    leg: Callable[[Any, Any], tuple[Any, ...]]
+    #: (point [m], active) -> the depth of the segment to a point, by channel [1]
+    segment: Callable[[Any, Any], tuple[Any, ...]]
     #: (point [m], active) -> whether no surface is in the way; None where nothing casts a shadow
     lit: Callable[[Any, Any], Any] | None
 
@@ -134,28 +134,28 @@ def light_once(
         full = depths_along(way[0], even, *way[1:], stride=stride, seen=False, first=rays.first)
     mean = sum(full) / (channels * SPREAD)
     # In thin clouds 1 - exp(-T) is lost in rounding; the first two terms of its series, which it exceeds, are not.
-    share = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) * (_LAST / steps)
+    fraction = dr.maximum(1 - dr.exp(-mean), mean * dr.fma(-0.5, mean, 1)) * (_LAST / steps)
 
     def step(total, x, cloud):
         depths, *_ = total
         kappa = sum(dr.gather(Float, own, cloud) for own in clouds.sigma_t) / channels
         growth = exp_bounded(dr.minimum(sum(depths) / channels, OPAQUE) / SPREAD)
-        part = share * growth
+        part = fraction * growth
         ahead = SPREAD * dr.maximum(part, -dr.log(dr.maximum(1 - part, 1e-30)))
         node = dr.select((part < 1) & (kappa > 0), ahead / kappa, dr.inf)
         return node if clouds.density is None else dr.minimum(node, stride * voxel(clouds, cloud) * growth)
 
     def add(total, begin, end, cloud):
-        depths, legs, lit, sums = total
-        next_legs, next_lit = reaching(rays, beams, end)
+        depths, segments, lit, sums = total
+        next_segments, next_lit = reaching(rays, beams, end)
         length = (end - begin) * middle_density(clouds, rays.origin, rays.direction, begin, end, cloud)
         own = tuple(dr.gather(Float, sigma_t, cloud) * length for sigma_t in clouds.sigma_t)
         after = tuple(depth + part for depth, part in zip(depths, own))
         shown = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
-        ends = (depths, after), (legs, next_legs)
-        # Where a stretch begins, so do the legs: its first step has no length.
+        ends = (depths, after), (segments, next_segments)
+        # Where a stretch begins, so do the segments: its first step has no length.
         sums = with_step(clouds, beams, sums, own, *ends, shown, cloud, end > begin, printed=printed)
-        return (after, next_legs, next_lit, sums), least(after) < OPAQUE
+        return (after, next_segments, next_lit, sums), least(after) < OPAQUE
 
     def zeros(count: int):
         return tuple(dr.zeros(Float, lanes) for _ in range(count))
@@ -192,21 +192,21 @@ def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, directio
 
 
 def reaching(rays: CloudRays, beams: Sequence[Beam], x) -> tuple[Any, Any]:
-    """Return by beam the depths of the legs to rays at a distance [m], and 1 where no surface is in the way."""
+    """Return by beam the depths of the segments to rays at a distance [m], and 1 where no surface is in the way."""
     Float, point = type(x), rays.origin + rays.direction * x
-    legs = tuple(beam.leg(point, True) for beam in beams)
-    return legs, tuple(
+    segments = tuple(beam.segment(point, True) for beam in beams)
+    return segments, tuple(
         Float(1) if beam.lit is None else dr.select(beam.lit(point, True), Float(1), 0) for beam in beams
     )
 
 
 def with_step(
-    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, legs, lit, cloud, long, *, printed: bool
+    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, segments, lit, cloud, long, *, printed: bool
 ) -> tuple[tuple[Any, ...], ...]:
     """Return sums by beam and octave with the light of a step in a cloud of some number, where it has a length.
 
-    `own`, `depths`: as of `step_light`; `legs`: at both ends, by beam and channel [1]; `lit`: by beam, what no surface
-    hides [1].
+    `own`, `depths`: as of `step_light`; `segments`: at both ends, by beam and channel [1]; `lit`: by beam, what no
+    surface hides [1].
     """
     albedo = dr.gather(type(clouds.albedo), clouds.albedo, cloud)
     several = len(clouds.phases) > 1
@@ -218,7 +218,7 @@ def with_step(
                 totals, step_light(beam, own, depths, (was, now), printed=printed), beam.phases, strict=True
             )
         )
-        for beam, totals, was, now, shown in zip(beams, sums, *legs, lit, strict=True)
+        for beam, totals, was, now, shown in zip(beams, sums, *segments, lit, strict=True)
     )
 
 
@@ -234,42 +234,43 @@ def finished(clouds: Clouds, beams: Sequence[Beam], sums) -> tuple[tuple[Any, ..
     )
 
 
-def step_light(beam: Beam, own, depths, legs, *, printed: bool) -> list[Any]:
+def step_light(beam: Beam, own, depths, segments, *, printed: bool) -> list[Any]:
     """Return the integrals of exp(-tau - a l) dtau over a step by octave, colours [1].
 
-    `beam`: the light; `own`: the depth of the step, by channel [1]; `depths`, `legs`: tau and l at its two ends, by
+    `beam`: the light; `own`: the depth of the step, by channel [1]; `depths`, `segments`: tau and l at its two ends, by
     channel [1]; `printed`: whether to return what the paper prints.
     """
     Color = type(beam.irradiance)
     by_octave = []
     for scale in beam.scales:
         parts = [
-            _step(part, (before, then), (scale * leg, scale * next_leg), printed=printed)
-            for part, before, then, leg, next_leg in zip(own, *depths, *legs, strict=True)
+            _step(part, (before, then), (scale * segment, scale * next_segment), printed=printed)
+            for part, before, then, segment, next_segment in zip(own, *depths, *segments, strict=True)
         ]
         by_octave.append(Color(*(parts * (3 // len(parts)))))
     return by_octave
 
 
-def _step(depth, eye, leg, *, printed: bool):
-    """Return the integral over a step of its own `depth`, from the depths to the `eye` and of the `leg` at its ends."""
-    first, last = eye[0] + leg[0], eye[1] + leg[1]
+def _step(depth, eye, segment, *, printed: bool):
+    """Return the integral over a step of a `depth`, from the depths to the `eye` and of the `segment` at the ends."""
+    first, last = eye[0] + segment[0], eye[1] + segment[1]
     if printed:
         return dr.exp(-last) - dr.exp(-first)
-    change = dr.abs(depth + (leg[1] - leg[0]))
+    change = dr.abs(depth + (segment[1] - segment[0]))
     _, less = exp_expm1_bounded(-change)
     return depth * exp_bounded(-dr.minimum(first, last)) * dr.select(change > 0, -less / change, 1)
 
 
-def light_on_surfaces(rays: CloudRays, leg: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:
-    """Return the share of a light that clouds let through to the visible surfaces, a colour [1]; 1 where there is none.
+def light_on_surfaces(rays: CloudRays, segment: Callable[[Any, Any], tuple[Any, ...]]) -> PerRay:
+    """Return the fraction of a light that clouds let through to visible surfaces, a colour [1]; 1 where there is none.
 
-    `rays`: rays up to the surfaces; `leg`: (point [m], active) -> the depth of the leg to a point, by channel [1].
+    `rays`: rays up to the surfaces; `segment`: (point [m], active) -> the depth of the segment to a point, by channel
+    [1].
     """
     Color = type(rays.clouds.albedo)
     seen = dr.isfinite(rays.end)
     place = rays.origin + rays.direction * dr.select(seen, rays.end, 0)
-    return dr.select(seen, Color(*(dr.exp(-depth) for depth in leg(place, seen))), 1)
+    return dr.select(seen, Color(*(dr.exp(-depth) for depth in segment(place, seen))), 1)
 
 
 def sky_behind(lights: Sequence[Light], distance, Color) -> PerRay | None:

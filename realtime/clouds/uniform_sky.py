@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The light that clouds scatter from a sky that is the same everywhere, by order of scattering.
 
-**The share of light paths that leave a slab after a number of scatterings.**
+**The fraction of light paths that leave a slab after a number of scatterings.**
 
 Light goes both ways along a path. Under a sky of the radiance L everywhere, below as above, the eye gets of order n
 
@@ -11,10 +11,10 @@ as whatever such a path meets behind the cloud is L. If nothing is absorbed, eve
 L times the opacity of the ray, exactly, for a cloud of any shape. The shape therefore decides only how this light
 is divided among the orders.
 
-For a slab of the thickness t and a ray of the cosine mu these shares follow from the equation of transfer with light
+For a slab of the thickness t and a ray of the cosine mu these fractions follow from the equation of transfer with light
 entering at both faces, I_0 = exp(-s/|mu|), s the depth from the face where a direction enters, order after order as in
 `realtime.clouds.slab_orders`, in the mean over azimuths alone. What is kept is divided by 1 - exp(-t/mu), so that the
-shares of all sets add up to 1 at albedo 1.
+fractions of all sets add up to 1 at albedo 1.
 
 **The light that clouds scatter from a uniform sky into rays, by set of orders.**
 
@@ -25,7 +25,7 @@ mu between ray and normal there, and the thickness t = mu T, through which the r
 2 V/S, with which it has the mean chord 4 V/S of a cloud of the volume V and the surface S: light leaves a body to all
 sides. A camera in a cloud looks across its slab.
 
-With absorption the sum is that of the slab. Opaque shapes hide the same share of the sky from all orders: of eight
+With absorption the sum is that of the slab. Opaque shapes hide the same fraction of the sky from all orders: of eight
 directions from the place of entry, those that they block.
 """
 
@@ -68,7 +68,7 @@ def thicknesses() -> Array:
 
 
 def escapes(phase: SlabPhase, albedo: float) -> Array:
-    """Return the shares by set of orders, (thicknesses, cosines, sets), cosines even from 0 to 1.
+    """Return the fractions by set of orders, (thicknesses, cosines, sets), cosines even from 0 to 1.
 
     They are made in some seconds and kept on disk.
 
@@ -79,13 +79,13 @@ def escapes(phase: SlabPhase, albedo: float) -> Array:
     medium = medium_numbers(phase, albedo)
     arrays = load_kept(digest, medium)
     if arrays is None:
-        arrays = {"shares": np.stack([slab_escapes(t, phase, albedo) for t in thicknesses()])}
+        arrays = {"fractions": np.stack([slab_escapes(t, phase, albedo) for t in thicknesses()])}
         keep(digest, medium, arrays)
-    return np.asarray(arrays["shares"])
+    return np.asarray(arrays["fractions"])
 
 
 def slab_escapes(tau: float, phase: SlabPhase, albedo: float) -> Array:
-    """Return the shares of a slab of the thickness `tau`, (cosines, sets); see `escapes`."""
+    """Return the fractions of a slab of the thickness `tau`, (cosines, sets); see `escapes`."""
     rule = double_gauss(_STREAMS)
     moments = phase.moments(2 * _STREAMS + 1)
     peak = float(moments[-1])
@@ -107,9 +107,9 @@ def slab_escapes(tau: float, phase: SlabPhase, albedo: float) -> Array:
     bounds = [first - 1 for first in FIRST_ORDERS]
     sets = [sum(leaving[first:end]) for first, end in pairwise(bounds)] + [edges[0, upward]]
     cosines = rule.mu[upward]
-    shares = np.stack(sets, axis=-1) / -np.expm1(-tau / cosines)[:, None]
+    fractions = np.stack(sets, axis=-1) / -np.expm1(-tau / cosines)[:, None]
     wanted = np.linspace(0.0, 1.0, COSINES)
-    return np.stack([_along(wanted, cosines, shares[:, number]) for number in range(len(sets))], axis=-1)
+    return np.stack([_along(wanted, cosines, fractions[:, number]) for number in range(len(sets))], axis=-1)
 
 
 def _along(wanted: Array, cosines: Array, values: Array) -> Array:
@@ -132,7 +132,7 @@ _SETS = len(ORDER_LAYERS)
 class SkyEscapes:
     """The fractions of light paths that leave a slab, on the device."""
 
-    shares: Any  #: medium after medium, (thicknesses, cosines, sets)
+    fractions: Any  #: medium after medium, (thicknesses, cosines, sets)
     media: tuple[Any, ...]  #: by channel, the number of the medium that fills each cloud
     widths: Any  #: by cloud, 2 V/S [m]
 
@@ -147,7 +147,7 @@ def beams_of(lights: Sequence[Light], sky: str, clouds: Clouds) -> list[int]:
 
 
 def sky_escapes(scene: Scene) -> SkyEscapes:
-    """Return the shares of all media of the clouds of a scene; made once."""
+    """Return the fractions of all media of the clouds of a scene; made once."""
     clouds, types = scene.medium.clouds, types_of(type(scene.camera.origin.x))
     assert clouds is not None
     phases = np.array(clouds.phase)
@@ -180,11 +180,11 @@ def sky_light(known: SkyEscapes, light: Light, rays: CloudRays, visible: Visible
         sigma_t = dr.gather(Float, rays.clouds.sigma_t[min(channel, len(rays.depths) - 1)], first.cloud)
         thickness = dr.minimum(depth * mu, sigma_t * dr.gather(Float, known.widths, first.cloud))
         medium = dr.gather(mi.UInt32, known.media[channel], first.cloud)
-        by_channel.append(_shares(known.shares, medium, thickness, mu))
+        by_channel.append(_fractions(known.fractions, medium, thickness, mu))
     radiance = light.sky * opacity_of(rays.depths, Color)
     if visible is not None:
         begin = dr.select(first.leaves | ~dr.isfinite(first.distance), 0, first.distance)
-        radiance *= _seen_share(light, rays.origin + rays.direction * begin, visible)
+        radiance *= _seen_fraction(light, rays.origin + rays.direction * begin, visible)
     return tuple(radiance * Color(*parts) for parts in zip(*by_channel))
 
 
@@ -198,8 +198,8 @@ def _slab_width(shape: Any) -> float:
     return float(2 * abs(np.sum(a * areas)) / 3 / np.linalg.norm(areas, axis=1).sum())
 
 
-def _seen_share(light: Light, point: Any, visible: Visible) -> Any:
-    """Return the share of the sky that opaque shapes leave to points [1]."""
+def _seen_fraction(light: Light, point: Any, visible: Visible) -> Any:
+    """Return the fraction of the sky that opaque shapes leave to points [1]."""
     Float = type(point.x)
     corners = itertools.product((-1, 1), repeat=3)
     axes = [mi.Vector3d(*(sign * (1 / 3) ** 0.5 for sign in corner)) for corner in corners]
@@ -207,7 +207,7 @@ def _seen_share(light: Light, point: Any, visible: Visible) -> Any:
     return sum(seen) / len(seen)
 
 
-def _shares(table: Any, medium: Any, thickness: Any, mu: Any) -> list[Any]:
-    """Return the shares of all sets, linear in the logarithm of the thickness and in mu."""
+def _fractions(table: Any, medium: Any, thickness: Any, mu: Any) -> list[Any]:
+    """Return the fractions of all sets, linear in the logarithm of the thickness and in mu."""
     along = dr.log(dr.clip(thickness, THINNEST, THICKEST) / THINNEST) / np.log(THICKEST / THINNEST)
     return between_entries(table, [(along, THICKNESSES), (mu, COSINES)], _SETS, first=medium)

@@ -151,9 +151,9 @@ _LOBE = """float al_lobe(float down, float a, float b, float c) {
 """
 
 
-def _lobe(share: float, g: float) -> str:
+def _lobe(fraction: float, g: float) -> str:
     """Return a lobe of Henyey and Greenstein's: 1 - g in float32 would have lost the digits of a sharp one."""
-    numbers = (4 * g, (1 - g) ** 2, share * (1 - g) * (1 + g))
+    numbers = (4 * g, (1 - g) ** 2, fraction * (1 - g) * (1 + g))
     return f"al_lobe(down, {', '.join(map(_number, numbers))})"
 
 
@@ -164,10 +164,10 @@ def _phase(phase: Phase) -> str:
     if isinstance(phase, HenyeyGreenstein):
         return start + signature + _HG
     if isinstance(phase, HgDraine):
-        (share, narrow), (_, wide) = phase.lobes
+        (fraction, narrow), (_, wide) = phase.lobes
         constant, square = map(_number, phase.rise)
         more = f"({constant} + {square} * (up - down) * (up - down)) * {_lobe(1.0, wide)}"
-        return f"{_LOBE}{start}{signature}    return {_lobe(share, narrow)} + {more};\n}}\n"
+        return f"{_LOBE}{start}{signature}    return {_lobe(fraction, narrow)} + {more};\n}}\n"
     if isinstance(phase, Hazy | Murky):
         first, last = _number(phase.polynomial[0]), _number(phase.polynomial[-1])
         lines = "".join("    power = power * power;\n" for _ in range(phase.doublings))
@@ -180,7 +180,7 @@ def _phase(phase: Phase) -> str:
     )
 
 
-_TAKES = """// The airlight integral J [1/m] of a point light from x0 to x1 [m] along a ray; x1 > 1e30 is endless.
+_TAKES = """// The airlight integral J [1/m] of a point light from x0 to x1 [m] along a ray; x1 > 1e30 is unbounded.
 // foot, height [m]: al_ray; sigma_t [1/m]; g: mean cosine in (-1, 1), positive forward, of Henyey and Greenstein's
 // phase function; others ignore it.
 """

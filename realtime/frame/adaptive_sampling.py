@@ -6,7 +6,7 @@ tile of 4 x 4, and all pixels of a tile only where the airlight between these co
 
 Let Delta be the second difference f_(i-1) - 2 f_i + f_(i+1) of the airlight along a row or a column of corners, h
 apart. Where f is smooth, linear interpolation misses it by up to |f''| h^2/8, which is Delta/8. Where it has a kink
-between two corners, at the share w of the way and with a change of slope s, it misses it by s h w (1 - w), while the
+between two corners, at the fraction w of the way and with a change of slope s, it misses it by s h w (1 - w), while the
 Deltas at the two corners are s h (1 - w) and s h w: the larger is at least twice the error. So a tile is interpolated
 where
 
@@ -145,7 +145,7 @@ def adaptive_layers(
 
     `render`: renders some pixels; `corners`, `pixel`, `width`: of the image: its pixel numbers in square tiles, and how
     many pixels a row has; `distance`: to the visible surfaces [m]; `tolerance`: largest second difference between
-    corners, as a share of the value; `last`: what the last frame handed on, by tile; None for the first.
+    corners, as a fraction of the value; `last`: what the last frame handed on, by tile; None for the first.
     """
     Float, lanes = type(distance), dr.width(pixel)
     tiles = lanes // TILE
@@ -192,10 +192,15 @@ def _is_mask(fraction: Any) -> bool:
 
 def _parts(layers: Layers, Float: Any) -> tuple[list[Any], list[Any]]:
     """Return the numbers and colours of layers, the airlight first, and the masks as 0 or 1."""
-    shares, extra = layers.visibility or (), (layers.extra or {}).values()
-    more = (layers.transmittance, layers.background, *extra, *(share for share in shares if not _is_mask(share)))
+    fractions, extra = layers.visibility or (), (layers.extra or {}).values()
+    more = (
+        layers.transmittance,
+        layers.background,
+        *extra,
+        *(fraction for fraction in fractions if not _is_mask(fraction)),
+    )
     numbers = [layers.in_scattered, *(value for value in more if value is not None)]
-    return numbers, [dr.select(share, Float(1), 0) for share in shares if _is_mask(share)]
+    return numbers, [dr.select(fraction, Float(1), 0) for fraction in fractions if _is_mask(fraction)]
 
 
 def _with_parts(layers: Layers, numbers: list[Any], masks: list[Any]) -> Layers:
@@ -205,10 +210,10 @@ def _with_parts(layers: Layers, numbers: list[Any], masks: list[Any]) -> Layers:
     transmittance = None if layers.transmittance is None else next(number)
     background = None if layers.background is None else next(number)
     extra = None if layers.extra is None else {name: next(number) for name in layers.extra}
-    shares = layers.visibility
-    if shares is not None:
-        shares = tuple(next(mask) if _is_mask(share) else next(number) for share in shares)
-    return Layers(in_scattered, shares, transmittance, background, extra, layers.carried)
+    fractions = layers.visibility
+    if fractions is not None:
+        fractions = tuple(next(mask) if _is_mask(fraction) else next(number) for fraction in fractions)
+    return Layers(in_scattered, fractions, transmittance, background, extra, layers.carried)
 
 
 def _smooth(corners: Corners, distance: Metres, numbers: list[Any], masks: list[Any], tolerance: float) -> PerTile:

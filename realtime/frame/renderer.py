@@ -309,7 +309,7 @@ def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, alone: bool):
     """
     surface, beyond = None, layers.background
     if layers.visibility is not None:
-        surface = _sum(tuple(_lit(share, color) for share, color in zip(layers.visibility, by_light)))
+        surface = _sum(tuple(_lit(fraction, color) for fraction, color in zip(layers.visibility, by_light)))
     if layers.transmittance is not None:
         surface = layers.transmittance * (_sum(by_light) if surface is None else surface)
         beyond = None if beyond is None else layers.transmittance * beyond
@@ -323,8 +323,8 @@ def _sum(colors: tuple[PerRay, ...]) -> PerRay:
     return reduce(add, colors)
 
 
-def _lit(share: PerRay, color: PerRay) -> PerRay:
-    return dr.select(share, color, 0) if isinstance(share, bool) or dr.is_mask_v(share) else share * color
+def _lit(fraction: PerRay, color: PerRay) -> PerRay:
+    return dr.select(fraction, color, 0) if isinstance(fraction, bool) or dr.is_mask_v(fraction) else fraction * color
 
 
 def render_frame(renderer: FrameRenderer) -> Frame:

@@ -39,7 +39,7 @@ def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[fl
     """Render the mean over some rays of each pixel.
 
     `renderer`: from `realtime.frame.renderer.frame_renderer`. What a method makes of the scene is made again for each
-    ray. `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the share done. Returns `Frame`:
+    ray. `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the fraction done. Returns `Frame`:
     mean radiances; the distance is that of the first ray.
     """
     camera, frame = renderer.scene.camera, None

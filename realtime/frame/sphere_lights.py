@@ -98,7 +98,7 @@ def sampled_sphere(light: AreaLight, points: LightSamples, Float: Any) -> Sample
 
 
 def _places(view: View, sphere: SampledSphere):
-    """Return what gives the normal at a place of a number, and its share of the area times the places."""
+    """Return what gives the normal at a place of a number, and its fraction of the area times the places."""
     Float, pi = type(sphere.radius), dr.pi
     direction, radius = view.direction, sphere.radius
     way = sphere.centre - view.origin

@@ -6,7 +6,7 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
 zero where a shadow ray is blocked; of a directional light rho E cos(theta_p) / pi arrives at once. With bounded media
-both exponents are sums over the media that the two legs cross (`realtime.scene.media.bounded`). A one-sided
+both exponents are sums over the media that the two segments cross (`realtime.scene.media.bounded`). A one-sided
 surface is black from behind, as in Mitsuba's `diffuse`.
 
 What is cast depends on camera and geometry alone, and serves many frames (`realtime.frame.incremental`). So there are
@@ -120,7 +120,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
 def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Sequence[Light], depths, shadows: bool):
     """Return the sum of `lit_surface` over the points of an area light [W/(m^2 sr)].
 
-    What they have in common is taken out of the sum: their intensity, the albedo and the leg to the eye.
+    What they have in common is taken out of the sum: their intensity, the albedo and the segment to the eye.
 
     `scene`, `surface`, `depths`, `shadows`: as for `lit_surface`; `medium`: without bounded media in it; `lights`: the
     points of one light.

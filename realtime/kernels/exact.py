@@ -145,13 +145,13 @@ def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, r
     """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     totals = [type(length)(0) for _ in extinctions]
-    for fraction, share in unit_nodes(rule.nodes):
+    for fraction, node_weight in unit_nodes(rule.nodes):
         step = length * fraction
         s = s0 + step
         square = dr.fma(s, s, height_squared)
         inverse = dr.rsqrt(square)
         r = square * inverse
-        value = share * dr.square(inverse)
+        value = node_weight * dr.square(inverse)
         if not phase.constant:
             value *= phase.evaluate_half(*_half_angle(s, r, inverse, height_squared))
         path = x0 + (step + r)
@@ -200,15 +200,15 @@ def panels_mean(
     count = panel_count(phase, width, largest * scale * c * width / most, soft=weight is not None)
     part_of_all = dr.rcp(dr.maximum(Float(count), 1))
     part = width * part_of_all
-    offsets = [(share, *_offset(part * fraction)) for fraction, share in unit_nodes(nodes)]
+    offsets = [(node_weight, *_offset(part * fraction)) for fraction, node_weight in unit_nodes(nodes)]
     sinh_end, less_end = _offset(part)
     # Not 0 in a vacuum, where Dr.Jit would see a depth that no turn of the loop changes, and drop it from the state.
     rates = [dr.minimum(-decay * scale * LOG2_E, -_NO_RATE) for decay in decays]
 
     def panel(index, f, c, depths, totals):
-        for share, sinh, less in offsets:
+        for node_weight, sinh, less in offsets:
             step = dr.fma(f, less, c * sinh)
-            value = share * phase.density(f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
+            value = node_weight * phase.density(f + step, dr.fma(f, sinh, dr.fma(c, less, c)), scale)
             if weight is not None:
                 value *= weight(scale * (f + step))
             kept = [_kept(dr.fma(rate, step, depth)) for rate, depth in zip(rates, depths)]

@@ -61,7 +61,7 @@ def taylor_bounded(
     x1,
     light: Light,
     phase: Phase,
-    leg: ConstantLeg,
+    segment: ConstantLeg,
     *,
     degree: int = 4,
     printed: bool = False,
@@ -71,8 +71,8 @@ def taylor_bounded(
     Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the medium. The paper
     prints no coefficients for the derived exponent.
     """
-    if leg.printed:
-        coefficients = _coefficients(leg.sigma_t * leg.distance, phase, degree, printed=printed)
+    if segment.printed:
+        coefficients = _coefficients(segment.sigma_t * segment.distance, phase, degree, printed=printed)
     elif printed:
         raise InputError(
             "kernel taylor-printed: the paper prints no coefficients for the exponent that section 4.2 must mean; use "
@@ -80,11 +80,11 @@ def taylor_bounded(
         )
     else:
         _check_degree(degree)
-        series = tangent_series(leg.sigma_t * geometry.height, degree)
+        series = tangent_series(segment.sigma_t * geometry.height, degree)
         coefficients = series_product(series, _phase_series(phase, degree, "taylor"), degree)
-    depth = dr.fma(leg.sigma_t, geometry.foot, leg.depth)
-    if leg.printed:
-        depth = dr.fma(leg.sigma_t, leg.distance, depth)  # e^-b, which the coefficients leave out
+    depth = dr.fma(segment.sigma_t, geometry.foot, segment.depth)
+    if segment.printed:
+        depth = dr.fma(segment.sigma_t, segment.distance, depth)  # e^-b, which the coefficients leave out
     return _polynomial(geometry, x0, x1, light, coefficients) * dr.exp(-depth) / geometry.height
 
 

@@ -11,10 +11,10 @@ Other clouds dim the light of all orders on its way to a cloud, and opaque shape
 for the others at the collector, over whose width the shade of other clouds is a mean.
 
 The peak of a phase function below five degrees is cut from the orders from 2 on, as light in the peak hardly leaves its
-way: with f the share of the peak and a the albedo, the density is (1 - a f) sigma_t and the albedo a (1 - f)/(1 - a f);
-single scattering has P/(1 - a f) with that density (TMS), so that nothing is counted twice. `peak=matched` takes the f
-of the phase function, `half` the printed 0.5, `full` cuts nothing: only then the sets hold the orders of the medium as
-it is.
+way: with f the fraction of the peak and a the albedo, the density is (1 - a f) sigma_t and the albedo a (1 - f)/(1 - a
+f); single scattering has P/(1 - a f) with that density (TMS), so that nothing is counted twice. `peak=matched` takes
+the f of the phase function, `half` the printed 0.5, `full` cuts nothing: only then the sets hold the orders of the
+medium as it is.
 
 Of each cloud a ray shows what leaves at the first entry; where it leaves a cloud and enters it again, the slab of the
 first entry stands for both.
@@ -36,7 +36,7 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
-from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, share_of_peak, slab_phase
+from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, fraction_of_peak, slab_phase
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
@@ -50,7 +50,7 @@ from realtime.clouds.light_maps import (
     shade,
 )
 from realtime.clouds.lit_surface import dense_surface, lit_dense_surface
-from realtime.clouds.march import leg_by_lengths, leg_through
+from realtime.clouds.march import segment_by_lengths, segment_through
 from realtime.clouds.single_scattering import (
     Beam,
     CloudRays,
@@ -96,7 +96,7 @@ class CloudCollectors(Method):
         choices=("cold", "previous"),
     )
     settled: float = parameter(
-        0.0, "step with which a search ends early, as a share of sigma; 0: all steps are taken", least=0, below=1
+        0.0, "step with which a search ends early, as a fraction of sigma; 0: all steps are taken", least=0, below=1
     )
     transport: str = parameter(
         "grid", "the canonical transport by its grid, or by the paper's functions", choices=("grid", "fit")
@@ -123,7 +123,7 @@ class CloudCollectors(Method):
     steps: int = parameter(16, "steps of single scattering along a ray", least=1, most=4096)
     threshold: float = parameter(
         0.5,
-        "density, as a share of the largest, from which on a cloud with a grid of densities has its surface",
+        "density, as a fraction of the largest, from which on a cloud with a grid of densities has its surface",
         above=0,
         below=1,
     )
@@ -254,12 +254,12 @@ def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling,
     fillings, left = [], np.ones_like(albedos)
     for phase, albedo in sorted({(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}):
         known = clouds.phases[phase]
-        share = {"matched": share_of_peak(known, types), "half": _HALF, "full": 0.0}[parameters.peak]
+        fraction = {"matched": fraction_of_peak(known, types), "half": _HALF, "full": 0.0}[parameters.peak]
         filled = (phases == phase) & (albedos == albedo)
-        left[filled] = 1 - albedo * share
+        left[filled] = 1 - albedo * fraction
         medium = (
             slab_phase(known, types, modified=parameters.peak != "full"),
-            albedo * (1 - share) / (1 - albedo * share),
+            albedo * (1 - fraction) / (1 - albedo * fraction),
         )
         transport: Any = on_device(canonical_transport(*medium), types)
         if parameters.transport == "fit":
@@ -356,7 +356,7 @@ def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: 
     return Layers(
         in_scattered,
         tuple(
-            light_on_surfaces(rays, leg_through(state.surfaces, rays.clouds, light, stride=state.stride))
+            light_on_surfaces(rays, segment_through(state.surfaces, rays.clouds, light, stride=state.stride))
             for light in view.lights
         ),
         1 - opacity,
@@ -381,10 +381,10 @@ def _beam(view: View, state: CloudState, clouds: Clouds, number: int) -> Beam:
     lengths: list[Any] = [partial(length_along_light, of_cloud) for of_cloud in maps]
     if state.depths:
         lengths = [of_cloud.at for of_cloud in state.depths[number]]
-    leg = leg_by_lengths(clouds, lengths)
+    segment = segment_by_lengths(clouds, lengths)
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
     cosine = -dr.dot(view.direction, light.axis)
-    return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), leg, lit)
+    return Beam(light.intensity, (Float(1),), (tuple(phase.evaluate(cosine) for phase in clouds.phases),), segment, lit)
 
 
 def _many_times(
@@ -430,7 +430,7 @@ def _many_times(
                 active=filled,
             )
             lit = [_reaching(view, of_sun, own, entry, sun, collector) for collector in light.collectors]
-            of_fillings.append(tuple(radiance * share for radiance, share in zip(light.by_set, lit)))
+            of_fillings.append(tuple(radiance * fraction for radiance, fraction in zip(light.by_set, lit)))
             of_channel.append(light.collectors)
         kept.append(tuple(of_channel))
         sums.append([sum(parts) for parts in zip(*of_fillings)])
@@ -439,26 +439,26 @@ def _many_times(
 
 
 def _reaching(view: View, of_sun: LightMap, sigma_t: Any, entry: _Entry, sun: int, collector: Collector) -> Any:
-    """Return the share of a sun's light that other clouds and opaque shapes leave to a collector [1].
+    """Return the fraction of a sun's light that other clouds and opaque shapes leave to a collector [1].
 
     `sigma_t` is the extinction of each cloud, one channel [1/m].
     """
     Float, clouds = type(view.distance), dr.width(sigma_t)
-    centre, share = entry.point + collector.centre, Float(1)
+    centre, fraction = entry.point + collector.centre, Float(1)
 
-    def behind(number, share):
+    def behind(number, fraction):
         cover, length = shade(of_sun.of_cloud(number), centre, collector.width)
         attenuated = 1 - cover * (1 - dr.exp(-dr.gather(Float, sigma_t, number) * length))
-        return number + 1, dr.select(number == entry.cloud, share, share * attenuated)
+        return number + 1, dr.select(number == entry.cloud, fraction, fraction * attenuated)
 
     if clouds > 1:
         lanes = dr.width(centre)
-        _, share = dr.while_loop(
+        _, fraction = dr.while_loop(
             state=(dr.zeros(mi.UInt32, lanes), dr.full(Float, 1, lanes)),
-            cond=lambda number, share: number < clouds,
+            cond=lambda number, fraction: number < clouds,
             body=behind,
-            labels=("number", "share"),
+            labels=("number", "fraction"),
         )
     if view.features.shadows:
-        share = dr.select(view.visible(centre, view.lights[sun]), share, 0)
-    return share
+        fraction = dr.select(view.visible(centre, view.lights[sun]), fraction, 0)
+    return fraction

@@ -2,7 +2,7 @@
 r"""Octaves: many orders of scattering as single scattering that is extinguished less and less, what engines do.
 
 Light that was scattered more often comes in with less extinction and from more directions. So octave n is light of one
-scattering, the depth of its leg times a^n, its amount times b^n, the mean cosine of its phase function times c^n:
+scattering, the depth of its segment times a^n, its amount times b^n, the mean cosine of its phase function times c^n:
 
     L = sum_{n < N} b^n w E/(4 pi) int kappa P_n(cos) exp(-tau(x) - a^n l(x)) dx.
 
@@ -23,7 +23,7 @@ import numpy as np
 from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
 from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, order_layer
 from realtime.clouds.light_depths import LightDepths, sun_depths
-from realtime.clouds.march import leg_by_lengths, leg_through
+from realtime.clouds.march import segment_by_lengths, segment_through
 from realtime.clouds.single_scattering import Beam, cloud_rays, light_on_surfaces, light_once, opacity_of, sky_behind
 from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
@@ -69,7 +69,7 @@ class CloudOctaves(Method):
     provides_visibility = True
 
     octaves: int = parameter(8, "how many", least=1, most=31)
-    extinction: float = parameter(0.5, "a: times the depth of the leg, with every octave", above=0, most=1)
+    extinction: float = parameter(0.5, "a: times the depth of the segment, with every octave", above=0, most=1)
     contribution: float = parameter(0.5, "b: times the amount, with every octave", above=0, most=1)
     anisotropy: float = parameter(0.5, "c: times the mean cosine, with every octave", least=0, most=1)
     phase: str = parameter(
@@ -165,7 +165,8 @@ def _octaves(view: View, state: OctaveState, parameters: CloudOctaves) -> Layers
     return Layers(
         sum((radiance for _, radiance in parts), Color(0)),
         tuple(
-            light_on_surfaces(rays, leg_through(surfaces, clouds, light, stride=state.stride)) for light in view.lights
+            light_on_surfaces(rays, segment_through(surfaces, clouds, light, stride=state.stride))
+            for light in view.lights
         ),
         1 - opacity,
         sky_behind(view.lights, view.distance, Color),
@@ -177,8 +178,8 @@ def mean_cosine(phase: Phase, Float: Any) -> float:
     """Return the mean cosine of a phase function [1]; `Float` is the type of its arrays."""
     root = (np.arange(_ANGLES) + 0.5) / _ANGLES
     angle = np.pi * root**2
-    share = np.sin(angle) * np.array(phase.evaluate(Float(np.cos(angle))), dtype=np.float64) * root
-    return float(share @ np.cos(angle) / share.sum())
+    fraction = np.sin(angle) * np.array(phase.evaluate(Float(np.cos(angle))), dtype=np.float64) * root
+    return float(fraction @ np.cos(angle) / fraction.sum())
 
 
 def _phases(clouds: Clouds, parameters: CloudOctaves, Float: Any) -> tuple[Phase, ...]:
@@ -189,7 +190,7 @@ def _phases(clouds: Clouds, parameters: CloudOctaves, Float: Any) -> tuple[Phase
 
 
 def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctaves) -> Beam:
-    """Return a light with the depths of its legs and its phase functions by octave."""
+    """Return a light with the depths of its segments and its phase functions by octave."""
     clouds, surfaces, light = view.medium.clouds, state.surfaces, view.lights[number]
     assert clouds is not None
     Float = type(view.distance)
@@ -206,8 +207,8 @@ def _beam(view: View, state: OctaveState, number: int, parameters: CloudOctaves)
             own = tuple(HenyeyGreenstein(sharp * mean) for mean in means)
             sharp = sharp * state.anisotropy
         phases.append(tuple(phase.evaluate(cosine) for phase in own))
-    leg = leg_through(surfaces, clouds, light, stride=state.stride)
+    segment = segment_through(surfaces, clouds, light, stride=state.stride)
     if state.depths:
-        leg = leg_by_lengths(clouds, [of_cloud.at for of_cloud in state.depths[number]])
+        segment = segment_by_lengths(clouds, [of_cloud.at for of_cloud in state.depths[number]])
     lit = (lambda point, active: view.visible(point, light)) if view.features.shadows else None
-    return Beam(light.intensity, tuple(scales), tuple(phases), leg, lit)
+    return Beam(light.intensity, tuple(scales), tuple(phases), segment, lit)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Equi-angular sampling: a few random samples a ray, each of one light chosen by its power.
 
-With N lights of the airlight L_i along a ray, a share q_i of the power and an even random angle theta between those of
-the ends of the ray at light i, x = foot + h tan theta,
+With N lights of the airlight L_i along a ray, a fraction q_i of the power and an even random angle theta between those
+of the ends of the ray at light i, x = foot + h tan theta,
 
     L = sum_i L_i = E[ (theta_1 - theta_0) / q_i  dx/dtheta  f_i(x) ],        f_i the integrand with the visibility,
 
 is the mean of one sample: dx/dtheta / r^2 = 1/h leaves the product of exponential, phase and visibility, which is
-bounded (Kulla and Fajardo 2012, section 4). Sample k of S takes the share (k + c)/S of the power, c the shift of the
+bounded (Kulla and Fajardo 2012, section 4). Sample k of S takes the fraction (k + c)/S of the power, c the shift of the
 pattern, and another place for each k, by the step of Roberts' sequence in one dimension of two; the mean of all stays
 the integral, since each sample alone is right in the mean.
 
@@ -72,8 +72,8 @@ class EquiAngular(Method):
                 total += self._mean(lambda at, _, light=light: _sample(view, light, at), place, choice, total)
         for table in state:
 
-            def picked(at: Any, share: Any, table: Any = table) -> Any:
-                number, probability = table.pick(share)
+            def picked(at: Any, fraction: Any, table: Any = table) -> Any:
+                number, probability = table.pick(fraction)
                 return _sample(view, table.light(number, view.lights[table.first]), at) / probability
 
             total += self._mean(picked, place, choice, total)
@@ -93,7 +93,7 @@ class EquiAngular(Method):
 
 
 def _sample(view: View, light: Light, at: Any) -> Any:
-    """Return the radiance of one sample of a light, at a share of the angle at it [W/(m^2 sr)]."""
+    """Return the radiance of one sample of a light, at a fraction of the angle at it [W/(m^2 sr)]."""
     rays = view.lit_by(light)
     span = marched_steps(rays, view.distance, 1, "equiangular")
     x = span.place(dr.fma(at, span.width, span.begin))

@@ -98,7 +98,7 @@ class RayMarch(Method):
         """Refuse maps that have no room, and uniform steps on an unbounded ray through a vacuum."""
         if self.spacing == "uniform" and scene.features.vacuum and not scene.medium.clear:
             raise InputError(
-                "spacing=uniform: an endless ray through a vacuum has no step length; use spacing=equiangular"
+                "spacing=uniform: an unbounded ray through a vacuum has no step length; use spacing=equiangular"
             )
         if self.shadow == "map" and scene.features.shadows:
             check_maps(scene.lights, self.map)

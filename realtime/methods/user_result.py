@@ -65,12 +65,12 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
         raise InputError(
             f"method {name}: returned a {type(returned).__name__}; wanted realtime.methods.interface.method.Layers"
         )
-    shares = 0 if returned.visibility is None else len(returned.visibility)
+    fractions = 0 if returned.visibility is None else len(returned.visibility)
     wanted = len(view.lights) if visibility else 0
-    if shares != wanted or (returned.visibility is None) == visibility:
+    if fractions != wanted or (returned.visibility is None) == visibility:
         raise InputError(
-            f"method {name}: returned the visibility of {shares} lights, wanted that of {wanted}: one for each light "
-            "where `provides_visibility`, otherwise None"
+            f"method {name}: returned the visibility of {fractions} lights, wanted that of {wanted}: one for each "
+            "light where `provides_visibility`, otherwise None"
         )
     return replace(returned, in_scattered=checked_radiance(returned.in_scattered, view, name))
 

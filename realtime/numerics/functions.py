@@ -51,9 +51,9 @@ def host_direction(angle):
 
 def _diamond_angle(x, y, select):
     total = abs(x) + abs(y)
-    share = y / total
-    upper = select(x >= 0, share, 2 - share)
-    lower = select(x < 0, 2 - share, 4 + share)
+    fraction = y / total
+    upper = select(x >= 0, fraction, 2 - fraction)
+    lower = select(x < 0, 2 - fraction, 4 + fraction)
     angle = select(y >= 0, upper, lower)
     # 4 + share rounds to 4 just below the axis: that is azimuth 0.
     return select((total > 0) & (angle < TURN), angle, 0)
@@ -179,7 +179,7 @@ def summed(count: Any, term: Callable[[Any], Any], zero: Any) -> Any:
 
 
 def cell_of(position, count) -> tuple[Any, Any]:
-    """Return the entry before a position, and the share of the way to the next, of `count` entries at whole numbers.
+    """Return the entry before a position, and the fraction of the way to the next, of `count` entries at whole numbers.
 
     Positions are clipped to the entries; the last entry begins no cell.
     """
@@ -197,8 +197,8 @@ def between_entries(table, places: Sequence[tuple[Any, int]], width: int = 1, fi
     """
     Float = type(table)
     corners: list[tuple[Any, Any]] = [(first, Float(1))]
-    for share, count in places:
-        entry, weight = cell_of(share * (count - 1), count)
+    for fraction, count in places:
+        entry, weight = cell_of(fraction * (count - 1), count)
         corners = [
             (index * count + entry + step, part * (weight if step else 1 - weight))
             for index, part in corners

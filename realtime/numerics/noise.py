@@ -80,8 +80,8 @@ class Noise:
             hashed = (level << 24) | (hashed >> 8)
         elif kind == "ign":
             gradient = column * _GRADIENT[0] + row * _GRADIENT[1] + frame * _MOVED
-            share = mi.Float64(gradient) * (52.9829189 * 2.0**-32)
-            hashed = mi.UInt32((share - dr.floor(share)) * 2.0**32) + shared[0]
+            fraction = mi.Float64(gradient) * (52.9829189 * 2.0**-32)
+            hashed = mi.UInt32((fraction - dr.floor(fraction)) * 2.0**32) + shared[0]
         return _number(hashed + self.frame * _GOLDEN if golden else hashed)
 
 

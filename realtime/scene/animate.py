@@ -53,22 +53,22 @@ def _turned_directional(light: Light, extent: DirectionalExtent, turn: Array) ->
     )
 
 
-def coloured_light(light: Light, share: float) -> Light:
-    """Return a light whose red, green and blue rotate by a share of a turn; their sum stays."""
+def coloured_light(light: Light, fraction: float) -> Light:
+    """Return a light whose red, green and blue rotate by a fraction of a turn; their sum stays."""
     colours = {"intensity": light.intensity} | ({} if light.sky is None else {"sky": light.sky})
-    turned = {name: _rotated(np.array(colour, dtype=np.float64).ravel(), share) for name, colour in colours.items()}
+    turned = {name: _rotated(np.array(colour, dtype=np.float64).ravel(), fraction) for name, colour in colours.items()}
     return replace(light, **{name: _like(colours[name], colour) for name, colour in turned.items()})
 
 
-def _rotated(colour: Array, share: float) -> Array:
-    whole, part = divmod(3 * share, 1)
+def _rotated(colour: Array, fraction: float) -> Array:
+    whole, part = divmod(3 * fraction, 1)
     here, there = (np.roll(colour, int(whole) + step) for step in (0, 1))
     return (1 - part) * here + part * there
 
 
-def coloured_area_light(light: AreaLight, share: float) -> AreaLight:
-    """Return an area light whose red, green and blue rotate by a share of a turn; their sum stays."""
-    return replace(light, radiance=_rotated(light.radiance, share))
+def coloured_area_light(light: AreaLight, fraction: float) -> AreaLight:
+    """Return an area light whose red, green and blue rotate by a fraction of a turn; their sum stays."""
+    return replace(light, radiance=_rotated(light.radiance, fraction))
 
 
 def with_area_lights(scene: Scene, area_lights: Sequence[AreaLight]) -> Scene:

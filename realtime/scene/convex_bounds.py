@@ -186,9 +186,9 @@ def mean_distance(bounds: Bounds) -> float:
     return float(np.mean(np.linalg.norm(boundary - inside, axis=1)))
 
 
-def _on_triangles(corner: Array, share: Array, random) -> Array:
-    """Draw points that are uniform on each triangle, which is chosen by its share."""
-    share = np.maximum(share, 0)
-    chosen = corner[random.choice(len(corner), _SAMPLES, p=share / share.sum())]
+def _on_triangles(corner: Array, fraction: Array, random) -> Array:
+    """Draw points that are uniform on each triangle, which is chosen by its fraction."""
+    fraction = np.maximum(fraction, 0)
+    chosen = corner[random.choice(len(corner), _SAMPLES, p=fraction / fraction.sum())]
     u, v = np.sqrt(random.random((_SAMPLES, 1))), random.random((_SAMPLES, 1))
     return (1 - u) * chosen[:, 0] + u * (1 - v) * chosen[:, 1] + u * v * chosen[:, 2]

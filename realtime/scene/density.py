@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 _POINTS = 512  # at which a grid is compared with Mitsuba's
 _DIFFERENCE = 2e-3  # from it, of the largest value: a grid read well differs by rounding, 1e-4 where voxels are noise
-_BEYOND = 1e-4  # how far a hull may reach beyond its grid, as a share of that
+_BEYOND = 1e-4  # how far a hull may reach beyond its grid, as a fraction of that
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,12 @@ class Density:
         rho = dr.gather(type(self.table), self.table, 4 * voxel)
         above = rho > threshold
         total = float(dr.sum(mi.Float64(dr.select(above, rho, 0)))[0])
-        share = int(dr.count(above)[0])
-        return total / share if share else 1.0
+        fraction = int(dr.count(above)[0])
+        return total / fraction if fraction else 1.0
 
 
 def _cell(place, count) -> tuple[Any, Any]:
-    """Return the number of the voxel before a place, and the share of the way to the next."""
+    """Return the number of the voxel before a place, and the fraction of the way to the next."""
     Float = type(place)
     inside = dr.clip(place, 0, Float(count - 1))
     number = mi.UInt32(inside)
@@ -180,12 +180,12 @@ def _middle(medium: Any, words: re.Match) -> Array:
 
 def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
     """Refuse a medium whose extinction is another one than the grid's."""
-    share = np.random.default_rng(1).random((_POINTS, 3))
-    places = np.linalg.solve(grid.to_grid[:, :3], (share.T - grid.to_grid[:, 3:]))
+    fraction = np.random.default_rng(1).random((_POINTS, 3))
+    places = np.linalg.solve(grid.to_grid[:, :3], (fraction.T - grid.to_grid[:, 3:]))
     interaction = dr.zeros(mi.MediumInteraction3f, _POINTS)
     interaction.p = mi.Point3f(*(mi.Float(row) for row in places))
     _, _, sigma_t = medium.get_scattering_coefficients(interaction)
-    own = grid.largest * density_at(grid.values, share)
+    own = grid.largest * density_at(grid.values, fraction)
     worst = float(np.abs(np.array(sigma_t)[0] - own).max()) / grid.largest
     if worst > _DIFFERENCE:
         raise InputError(
@@ -194,13 +194,13 @@ def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
         )
 
 
-def density_at(values: NDArray[np.float32], share: Array) -> Array:
+def density_at(values: NDArray[np.float32], fraction: Array) -> Array:
     """Return what a grid (z, y, x) holds at places in the unit cube, (n, 3)."""
     counts = np.array(values.shape[::-1])
-    place = np.clip(share * counts - 0.5, 0, counts - 1)
+    place = np.clip(fraction * counts - 0.5, 0, counts - 1)
     cell = np.minimum(place.astype(np.int64), np.maximum(counts - 2, 0))
     offset = place - cell
-    total = np.zeros(len(share))
+    total = np.zeros(len(fraction))
     for corner in np.ndindex(2, 2, 2):
         x, y, z = np.minimum(cell + corner, counts - 1).T
         total += np.where(corner, offset, 1 - offset).prod(axis=1) * values[z, y, x]

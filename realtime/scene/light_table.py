@@ -3,7 +3,7 @@
 
 A loop over lights in Python makes a kernel that grows with them. A table makes all of them one: its rows are gathered.
 The power of a light is its intensity times the solid angle that it shines into, and tables pick a light by the inverse
-of the sum of powers: the least number whose sum of powers is above a share of the total.
+of the sum of powers: the least number whose sum of powers is above a fraction of the total.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,21 +25,21 @@ class LightTable:
     first: int  #: the number of one of them in the scene: what all have in common is its
     count: int
     columns: tuple[Any, ...]  #: the components of all their arrays, a light a row
-    sums: Any  #: of the powers up to each light, as shares of all
-    shares: Any  #: of each in the power of all
+    sums: Any  #: of the powers up to each light, as fractions of all
+    fractions: Any  #: of each in the power of all
 
     def light(self, number: Any, like: Light) -> Light:
         """Return the lights of some numbers, counted from 0; `like` is one of them."""
         return _taken(like, iter(self.columns), number)
 
-    def pick(self, share: Any) -> tuple[Any, Any]:
-        """Return a number for each share from 0 to 1, and the probability with which an even share leads to it."""
-        number = dr.zeros(mi.UInt32, dr.width(share))
+    def pick(self, fraction: Any) -> tuple[Any, Any]:
+        """Return a number for each fraction from 0 to 1, and the probability of that number if fractions are even."""
+        number = dr.zeros(mi.UInt32, dr.width(fraction))
         if self.count > 1:
             number = dr.binary_search(
-                0, self.count - 1, lambda place: dr.gather(type(share), self.sums, place) <= share
+                0, self.count - 1, lambda place: dr.gather(type(fraction), self.sums, place) <= fraction
             )
-        return number, dr.gather(type(share), self.shares, number)
+        return number, dr.gather(type(fraction), self.fractions, number)
 
 
 def light_tables(lights: Sequence[Light]) -> tuple[LightTable, ...]:

@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from drjit.scalar import ArrayXf64
 
-from realtime.droplets import CUT, droplet_table, share_cut
+from realtime.droplets import CUT, droplet_table, fraction_cut
 from realtime.errors import InputError
 from realtime.numerics.functions import between_entries, cell_of
 from realtime.scene.rule_reach import Reach, reach_of, shortest
@@ -287,28 +287,28 @@ class HgDraine(Phase):
 
     @property
     def lobes(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The share and the mean cosine of Henyey and Greenstein's function, then of Draine's."""
+        """The fraction and the mean cosine of Henyey and Greenstein's function, then of Draine's."""
         d = self.diameter
-        share = math.exp(-0.665888 - 0.599085 / (d - 0.641583))
+        fraction = math.exp(-0.665888 - 0.599085 / (d - 0.641583))
         narrow, wide = math.exp(-0.0990567 / (d - 1.67154)), math.exp(-0.428934 - 2.20679 / (d + 3.91029))
-        return (1 - share, narrow), (share, wide)
+        return (1 - fraction, narrow), (fraction, wide)
 
     @property
     def rise(self) -> tuple[float, float]:
-        """What Draine's function has of 1 and of cos^2 times the share of its lobe."""
-        (_, _), (share, wide) = self.lobes
+        """What Draine's function has of 1 and of cos^2 times the fraction of its lobe."""
+        (_, _), (fraction, wide) = self.lobes
         alpha = math.exp(3.62489 - 8.29288 / (self.diameter + 5.52825))
         mean = 1 + alpha * (1 + 2 * wide * wide) / 3
-        return share / mean, share * alpha / mean
+        return fraction / mean, fraction * alpha / mean
 
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
-        (share, narrow), (_, wide) = self.lobes
+        (fraction, narrow), (_, wide) = self.lobes
         constant, square = self.rise
         cos = up - down
         first = HenyeyGreenstein(narrow).evaluate_half(down, up)
         second = HenyeyGreenstein(wide).evaluate_half(down, up)
-        return dr.fma(share, first, dr.fma(square * cos, cos, constant) * second)
+        return dr.fma(fraction, first, dr.fma(square * cos, cos, constant) * second)
 
     def lobe_scales(self, Float) -> tuple[Any, Any]:
         """Return (1 - g)/(1 + g) of the narrow lobe, and 1."""
@@ -317,12 +317,12 @@ class HgDraine(Phase):
 
     def series(self, degree: int) -> list[Any]:
         """Return the coefficients of both lobes, Draine's times those of its square."""
-        (share, narrow), (_, wide) = self.lobes
+        (fraction, narrow), (_, wide) = self.lobes
         constant, square = self.rise
         sine = _sine(degree)
         rise = [constant * a + square * b for a, b in zip(_one(degree), series_product(sine, sine, degree))]
         first, second = (HenyeyGreenstein(dr.opaque(mi.Float64, g)).series(degree) for g in (narrow, wide))
-        return [share * a + b for a, b in zip(first, series_product(rise, second, degree))]
+        return [fraction * a + b for a, b in zip(first, series_product(rise, second, degree))]
 
 
 @dataclass(frozen=True)
@@ -362,7 +362,7 @@ class Mie(Phase):
 class ModifiedMie(Mie):
     """The same without what is below five degrees, divided by what is left (Bouthors 2008, appendix)."""
 
-    left: float = 1.0  #: share of the light beyond five degrees
+    left: float = 1.0  #: fraction of the light beyond five degrees
 
     name = "mie-modified"
 
@@ -440,7 +440,7 @@ def _droplets(name: str, Float, radius: float = 6.0, gamma: float = 2.0, wavelen
     lobe = math.tan(math.radians(0.5 * CUT)) if modified else table.peak
     reach = reach_of(eager.evaluate_half, (lobe, 1.0), _LEFT_DROPLETS)
     if modified:
-        return ModifiedMie(entries, lobe, reach, 1 - share_cut(radius, gamma, wavelength))
+        return ModifiedMie(entries, lobe, reach, 1 - fraction_cut(radius, gamma, wavelength))
     return Mie(entries, lobe, reach)
 
 

@@ -11,7 +11,7 @@ longest panel is the one beyond which the two differ by more than `LEFT`. Three 
   alike, whatever the height, which is 1 here;
 - in the tangent of the angle at the light from where the panel begins, of `realtime.scene.media.bounded_rays`.
 
-Extinction takes its share: each is tried in a vacuum and up to the depth that a panel of its kind may have.
+Extinction takes its fraction: each is tried in a vacuum and up to the depth that a panel of its kind may have.
 """
 
 import math
@@ -119,10 +119,10 @@ def _segment_error(value, ends, length: float, nodes: int, depth: float) -> floa
     worst = 0.0
     # Length and depth may reach their limits by themselves, together an ellipse.
     for angle in (0, 0.4, 0.8, 1.2):
-        share = length * math.cos(angle)
-        long = share * np.hypot(1, u)
-        s0 = np.concatenate([u, -u - long, -across * share])
-        whole = np.concatenate([long, long, np.full(len(across), share)])
+        fraction = length * math.cos(angle)
+        long = fraction * np.hypot(1, u)
+        s0 = np.concatenate([u, -u - long, -across * fraction])
+        whole = np.concatenate([long, long, np.full(len(across), fraction)])
         s1 = s0 + whole
         rate = depth * math.sin(angle) / (_along(s1) / np.hypot(1, s1) * whole)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from reference.monte_carlo.batches import LAYERS, Batches
 
-EQUAL = 0.25  #: share of the samples that is the same for every pixel
+EQUAL = 0.25  #: fraction of the samples that is the same for every pixel
 
 
 def allocated(
@@ -37,8 +37,8 @@ def allocated(
         variance = (pilot.standard_error[number] ** 2).sum(axis=1).reshape(shape)
         spread = np.where(masks[layer], np.sqrt(_neighbourhood(variance)), 0)
         mean = spread.mean()
-        share = spread / mean if mean > 0 else np.ones(shape)
-        counts.append(np.maximum(1, np.rint(samples * (EQUAL + (1 - EQUAL) * share))))
+        fraction = spread / mean if mean > 0 else np.ones(shape)
+        counts.append(np.maximum(1, np.rint(samples * (EQUAL + (1 - EQUAL) * fraction))))
     return np.stack(counts).reshape(len(LAYERS), -1).astype(np.uint32)
 
 

@@ -55,7 +55,7 @@ from reference.visibility.planes import Rays, before, rays_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Share = Callable[[float], None]
+Fraction = Callable[[float], None]
 
 _RTOL = 1e-6  # of the integral of one sample, whose estimate is many digits too large: far below the error of a mean
 _PAIRS = 1 << 16  # rays and samples at once
@@ -102,14 +102,14 @@ def area_airlight(
     *,
     plan: PointPlan,
     shadow_scale: float = 1.0,
-    tell: Share = lambda share: None,
+    tell: Fraction = lambda fraction: None,
     keep: Keep = lambda name, work: work(),
 ) -> AreaAirlight:
     """Compute the airlight of all area lights along every ray.
 
     `reference`, `beams`: the scene, and its lights from `beams_of`; `known`: the airlight of all other lights, to which
     errors are relative too, (rays, 3) [W/(m^2 sr)]; `plan`: how many samples; `shadow_scale`: see
-    `reference.quadrature.image.quadrature_image`; `tell`: called with the share of the work that is done; `keep`:
+    `reference.quadrature.image.quadrature_image`; `tell`: called with the fraction of the work that is done; `keep`:
     called with the name of each part of the work and a function that does it; may return what it did before.
     """
     count = len(reference.direction)
@@ -134,7 +134,7 @@ def _by_replicate(
     plan: PointPlan,
     work: Callable[[int, Index, Callable[[str], Array]], Kept],
     *,
-    tell: Share,
+    tell: Fraction,
     keep: Keep,
     add: Callable[[Index, Kept], None] = lambda active, got: None,
 ) -> Sums:
@@ -145,31 +145,31 @@ def _by_replicate(
         nonlocal done
         total = np.zeros((len(active), 3, REPLICATES))
         for number in range(lights):
-            found, shares = np.zeros(total.shape), np.ones((len(active), REPLICATES))
+            found, fractions = np.zeros(total.shape), np.ones((len(active), REPLICATES))
             for replicate in range(REPLICATES):
                 one = partial(work, number, active, partial(square_points, chosen, number, replicate))
                 got = keep(f"{layer}-{part}{number}-{chosen.most}-{replicate}", one)
                 found[..., replicate] = got["radiance"]
-                shares[:, replicate] = got.get("share", 1.0)
+                fractions[:, replicate] = got.get("fraction", 1.0)
                 if part != PILOT:
                     add(active, got)
                 done += 1
                 tell(done / rounds)
-            total += _controlled(found, shares)
+            total += _controlled(found, fractions)
         return total
 
     return sums
 
 
-def _controlled(found: Array, shares: Array) -> Array:
+def _controlled(found: Array, fractions: Array) -> Array:
     """Correct sums of replicates, (rays, 3, replicates), by the known whole of what a part of their samples has.
 
-    A replicate whose sections have the share s of the light's solid angle, of mean 1, is given (1 - s) c more. c is
+    A replicate whose sections have the fraction s of the light's solid angle, of mean 1, is given (1 - s) c more. c is
     what the whole is worth by the other replicates, which know nothing of s: the mean stays what it is.
     """
-    others = shares.sum(axis=1, keepdims=True) - shares
+    others = fractions.sum(axis=1, keepdims=True) - fractions
     worth = (found.sum(axis=2, keepdims=True) - found) / np.maximum(others, np.finfo(float).tiny)[:, None]
-    return found + (1 - shares)[:, None] * worth
+    return found + (1 - fractions)[:, None] * worth
 
 
 def turn_of_sections(plan: PointPlan, number: int) -> float:
@@ -225,7 +225,7 @@ def area_surface(
     *,
     plan: PointPlan,
     shadow_scale: float = 1.0,
-    tell: Share = lambda share: None,
+    tell: Fraction = lambda fraction: None,
     keep: Keep = lambda name, work: work(),
 ) -> Array:
     """Return the radiance of surfaces lit by area lights, by replicate, (rays, 3, replicates) [W/(m^2 sr)].
@@ -247,13 +247,13 @@ def area_surface(
     hidden = [_partly_hidden(beam, rows, turn) for beam, turn in zip(beams, turns, strict=True)]
 
     def work(number: int, active: Index, points: Callable[[str], Array]) -> Kept:
-        radiance, share, beam = np.zeros((len(active), 3)), np.ones(len(active)), beams[number]
+        radiance, fraction, beam = np.zeros((len(active), 3)), np.ones(len(active)), beams[number]
         for pairs, kind in ((False, beam.light.kind), (True, "pairs")):
             chosen = np.flatnonzero(hidden[number][active] == pairs)
             if len(chosen):
                 pixels, view = rows[active[chosen]], _View(beam, points(kind), turns[number], pairs)
-                radiance[chosen], share[chosen] = _reflected(view, pixels, shadow_scale, reflection)
-        return {"radiance": radiance * np.exp(-depth[active]), "share": share}
+                radiance[chosen], fraction[chosen] = _reflected(view, pixels, shadow_scale, reflection)
+        return {"radiance": radiance * np.exp(-depth[active]), "fraction": fraction}
 
     sums = _by_replicate("surface", len(beams), plan, work, tell=tell, keep=keep)
     result[rows], _ = replicate_means(len(rows), known[rows], plan, sums)
@@ -313,13 +313,13 @@ def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
 def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Reflection) -> tuple[Array, Array]:
     """Return sums over samples of what surface points reflect, before what is between them and the camera.
 
-    The second array says which share of the light's solid angle the sections of a point have, (rays,) [1].
+    The second array says which fraction of the light's solid angle the sections of a point have, (rays,) [1].
     """
     light, reference, each = view.beam.light, view.beam.scene, len(view.square)
-    total, share = np.zeros((len(active), 3)), np.ones(len(active))
+    total, fraction = np.zeros((len(active), 3)), np.ones(len(active))
     for rows, point, (row, place, weight), whole in view.seen(active):
         if view.even and light.kind == "rectangle":
-            share[rows] = whole.mean(axis=1) / solid_angle(light, point)
+            fraction[rows] = whole.mean(axis=1) / solid_angle(light, point)
         of = rows[row // each]
         point = point[row // each]
         way = place - point
@@ -328,7 +328,7 @@ def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Refl
         value = reflection(active[of], towards)
         shadow = optical_depth(reference, point, towards, np.zeros(len(of)), shadow_scale * r)
         total += sums_of(of, value * np.exp(-shadow) * weight[:, None] * light.radiance, len(total))
-    return total, share
+    return total, fraction
 
 
 def seen_samples(

@@ -53,7 +53,7 @@ def quadrature_image(
     """Compute the reference of an image.
 
     `reference`: the scene; `checks`: random shadow rays to each ray and light, which check the lit intervals;
-    `shadow_scale`: attenuate over this share [1] of each shadow segment: 1 is the reference, 1 - epsilon what a
+    `shadow_scale`: attenuate over this fraction [1] of each shadow segment: 1 is the reference, 1 - epsilon what a
     renderer with a shadow-ray epsilon converges to (DESIGN section 6.1). Such a renderer also starts its shadow rays
     off the surface, and so do those for `surface` then (`reference.visibility.certificate.reached_by_shadow_rays`).
     `pixel`: "centre": the radiance along the ray through the centre. "area": the mean over the pixel. `tolerance`: of a

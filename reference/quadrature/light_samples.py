@@ -99,7 +99,7 @@ class Sections:
     def drawn(self, lit: LitIntervals, uniform: Array) -> tuple[Index, Array, Array]:
         """Return which sections are seen at all, a point of what is seen of each, and the solid angle of that [sr].
 
-        `lit`: what is seen of each section, in shares of its length; `uniform`: numbers from 0 to 1, (n,), by which
+        `lit`: what is seen of each section, in fractions of its length; `uniform`: numbers from 0 to 1, (n,), by which
         points are drawn.
         """
         every, count = np.arange(len(self.weight)), len(self.weight)
@@ -125,8 +125,8 @@ class Sections:
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.nan_to_num((h * cosine - z * sine) / (dz * sine - dh * cosine))
         part = np.clip(part, lit.low[chosen], lit.high[chosen])
-        share = total[row] / np.maximum(np.abs(last - first)[row], _TINY)
-        return row, self.start[row] + part[:, None] * way, share * self.weight[row]
+        fraction = total[row] / np.maximum(np.abs(last - first)[row], _TINY)
+        return row, self.start[row] + part[:, None] * way, fraction * self.weight[row]
 
 
 @dataclass(frozen=True)
@@ -274,8 +274,8 @@ class _Fan:
         after = [np.roll(part, -1, axis=-1) for part in (beside, h, z)]
         cut = (beside >= 0) != (after[0] >= 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(cut, beside / (beside - after[0]), 0.0)
-        h, z = h + share * (after[1] - h), z + share * (after[2] - z)
+            fraction = np.where(cut, beside / (beside - after[0]), 0.0)
+        h, z = h + fraction * (after[1] - h), z + fraction * (after[2] - z)
         first = np.argmax(cut, axis=-1)[..., None]
         last = cut.shape[-1] - 1 - np.argmax(cut[..., ::-1], axis=-1)[..., None]
         last = np.where(cut.any(axis=-1, keepdims=True), last, first)

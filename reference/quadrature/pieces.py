@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Smooth pieces of lit intervals in scenes with bounded media.
 
-A piece lies inside of one medium, and the leg from the light passes no corner of a body while the point moves along it
-(`reference.quadrature.segments`); nor does the scattering angle pass a kink of a tabulated phase function.
+A piece lies inside of one medium, and the segment from the light passes no corner of a body while the point moves along
+it (`reference.quadrature.segments`); nor does the scattering angle pass a kink of a tabulated phase function.
 """
 
 from dataclasses import dataclass, fields, replace

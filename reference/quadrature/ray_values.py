@@ -51,7 +51,7 @@ class ReferenceImage:
     distance: Array  #: to the visible surface at the pixel's centre, infinite where there is none [m]
     light_angle: Array  #: smallest angle between the centre's ray and the direction to a light before the surface [rad]
     transitions: int  #: edges between light and shadow
-    missed: float  #: share of the first random shadow rays that contradicted the lit intervals
+    missed: float  #: fraction of the first random shadow rays that contradicted the lit intervals
     checked: int = 0  #: random shadow rays that checked the lit intervals
     disagreements: int = 0  #: of these, how many contradicted them
     refined: int = 0  #: contradictions that were settled, by mending the intervals or by a float64 test
@@ -155,6 +155,6 @@ def ray_values(
     return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, checked, **wide)
 
 
-def _tell(progress: Progress | None, total: int, done: int, share: float) -> None:
+def _tell(progress: Progress | None, total: int, done: int, fraction: float) -> None:
     if progress is not None:
-        progress(done + int(share * _STEPS), total, "quadrature")
+        progress(done + int(fraction * _STEPS), total, "quadrature")

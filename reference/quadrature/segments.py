@@ -116,8 +116,8 @@ def _corners(body: Polyhedron, rays: Rays) -> tuple[Index, Array, Array]:
     normal = np.cross(rays.direction, across)
     at_start, at_end = normal @ ends[:, 0].T, normal @ ends[:, 1].T
     ray, edge = np.nonzero((at_start * at_end <= 0) & (at_start != at_end))
-    share = (at_start[ray, edge] / (at_start[ray, edge] - at_end[ray, edge]))[:, None]
-    point = ends[edge, 0] + share * (ends[edge, 1] - ends[edge, 0])
+    fraction = (at_start[ray, edge] / (at_start[ray, edge] - at_end[ray, edge]))[:, None]
+    point = ends[edge, 0] + fraction * (ends[edge, 1] - ends[edge, 0])
     return ray, np.sum(point * rays.direction[ray], axis=1), np.sum(point * across[ray], axis=1)
 
 

@@ -37,7 +37,7 @@ from reference.scene.read import ReferenceScene
 from reference.scene.shapes import Shapes
 
 Array = NDArray[np.float64]
-Share = Callable[[float], None]
+Fraction = Callable[[float], None]
 
 _MOST = 64  # directions of a replicate
 _NUMBER = 1 << 20  # of the sky among lights: its lattices are not those of others
@@ -52,13 +52,18 @@ class SkyLight:
 
 
 def sky_light(
-    reference: ReferenceScene, hits: SurfaceHits, *, shapes: Shapes, plan: PointPlan, tell: Share = lambda share: None
+    reference: ReferenceScene,
+    hits: SurfaceHits,
+    *,
+    shapes: Shapes,
+    plan: PointPlan,
+    tell: Fraction = lambda fraction: None,
 ) -> SkyLight:
     """Compute what a uniform sky adds to airlight and surfaces along every ray.
 
     `reference`: the scene, which has a sky; `hits`: what its rays hit; `shapes`: what can stand in the light; `plan`:
-    the most directions of a replicate, its seed, and whether surfaces get the light; `tell`: called with the share of
-    the work that is done.
+    the most directions of a replicate, its seed, and whether surfaces get the light; `tell`: called with the fraction
+    of the work that is done.
     """
     assert reference.sky is not None
     count, most = len(hits.distance), min(plan.most, _MOST)

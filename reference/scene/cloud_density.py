@@ -14,8 +14,8 @@ from reference.scene.density_grid import grid_values
 
 Array = NDArray[np.float64]
 
-_SHARE = 0.125  # of a voxel, between the places at which a density is summed up along a ray
-_BEYOND = 1e-4  # how far a shape may reach beyond its grid, as a share of that
+_FRACTION = 0.125  # of a voxel, between the places at which a density is summed up along a ray
+_BEYOND = 1e-4  # how far a shape may reach beyond its grid, as a fraction of that
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class CloudDensity:
         """
         if not len(way):
             return np.zeros(0)
-        count = np.maximum(np.ceil(length / (_SHARE * self.voxel)), 1.0)
+        count = np.maximum(np.ceil(length / (_FRACTION * self.voxel)), 1.0)
         start = origin + way * begin[:, None]
         first, step = mi.Point3f(start.T), mi.Vector3f((way * (length / count)[:, None]).T)
         steps = mi.UInt32(count.astype(np.uint32))

@@ -73,11 +73,11 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
     values, low, high = grid_values(medium, name)
     largest = np.full(3, values.max())
     grid = GridMedium(values=values, low=low, high=high, albedo=albedo, phase=phase, largest=largest, plugin=medium)
-    share = np.random.default_rng(1).random((_PLACES, 3))
+    fraction = np.random.default_rng(1).random((_PLACES, 3))
     place = dr.zeros(mi.MediumInteraction3f, _PLACES)
-    place.p = mi.Point3f((low + share * (high - low)).T)
+    place.p = mi.Point3f((low + fraction * (high - low)).T)
     theirs = np.array(medium.get_scattering_coefficients(place)[2], dtype=np.float64)[0]
-    worst = np.abs(theirs - _trilinear(values, share * values.shape[::-1] - 0.5)).max() / values.max()
+    worst = np.abs(theirs - _trilinear(values, fraction * values.shape[::-1] - 0.5)).max() / values.max()
     if worst > _DIFFERENCE:
         raise InputError(
             f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "

@@ -40,7 +40,7 @@ class RandomChecks:
     disagreements: int = 0  #: of these, how many contradicted the intervals further from an edge than rounding
     refined: int = 0  #: disagreements that were settled by testing every shape in float64
     left: int = 0  #: disagreements that were not
-    missed: float = 0.0  #: share of the shadow rays that contradicted the intervals
+    missed: float = 0.0  #: fraction of the shadow rays that contradicted the intervals
 
     @staticmethod
     def of_all(parts: "list[RandomChecks]") -> "RandomChecks":
@@ -91,27 +91,27 @@ def certified(
     if not len(ray) or not shapes.count:
         return lit
     low, high = (_measure(rays, end, slice(None)) for end in ends)
-    share = (np.arange(checks) + _generator(rays.foot, rays.height).random((len(ray), checks))) / checks
-    ray, share = np.repeat(ray, checks), share.ravel()
-    at = low[ray] + share * (high - low)[ray]
+    fraction = (np.arange(checks) + _generator(rays.foot, rays.height).random((len(ray), checks))) / checks
+    ray, fraction = np.repeat(ray, checks), fraction.ravel()
+    at = low[ray] + fraction * (high - low)[ray]
     x = at if rays.w == 0 else rays.distance(at, ray)
     finite = np.isfinite(x)  # a light on the line of a ray sees all of it at one angle, which is endlessly far
-    ray, share, x = ray[finite], share[finite], x[finite]
-    # Two a ray, and the share of it that comes before: one number orders all.
+    ray, fraction, x = ray[finite], fraction[finite], x[finite]
+    # Two a ray, and the fraction of it that comes before: one number orders all.
     width = np.where(high > low, high - low, 1.0)
     begin, end = (
         np.clip((_measure(rays, part, lit.ray) - low[lit.ray]) / width[lit.ray], 0, 1) for part in (lit.low, lit.high)
     )
-    number = np.searchsorted(2.0 * lit.ray + begin, 2.0 * ray + share, side="right")
+    number = np.searchsorted(2.0 * lit.ray + begin, 2.0 * ray + fraction, side="right")
     count = len(lit.ray)
-    expected, gap = np.zeros(len(ray), bool), np.minimum(share, 1 - share)
+    expected, gap = np.zeros(len(ray), bool), np.minimum(fraction, 1 - fraction)
     for offset in (-1, 0):
         k = np.clip(number + offset, 0, max(count - 1, 0))
         if not count:
             break
         same = (number + offset >= 0) & (number + offset < count) & (lit.ray[k] == ray)
-        expected |= same & (begin[k] <= share) & (share <= end[k])
-        near = np.minimum(np.abs(share - begin[k]), np.abs(share - end[k]))
+        expected |= same & (begin[k] <= fraction) & (fraction <= end[k])
+        near = np.minimum(np.abs(fraction - begin[k]), np.abs(fraction - end[k]))
         gap = np.where(same, np.minimum(gap, near), gap)
     rounding = ROUNDING * (1.0 if rays.w else coordinates(rays, shapes))
     start, target = _segments(rays, ray, x, shapes)
@@ -264,7 +264,7 @@ def reached_by_shadow_rays(interaction: Any, light: Array, reached: Bools, *, sc
     start = np.array(ray.o, dtype=np.float64).T[differs]
     way = light - start
     length = np.linalg.norm(way, axis=1)
-    share = np.minimum(np.array(ray.maxt, dtype=np.float64)[differs] / np.maximum(length, np.finfo(float).tiny), 1.0)
+    fraction = np.minimum(np.array(ray.maxt, dtype=np.float64)[differs] / np.maximum(length, np.finfo(float).tiny), 1.0)
     confirmed = reached.copy()
-    confirmed[differs] = ~segments_blocked(start, start + way * share[:, None], shapes)
+    confirmed[differs] = ~segments_blocked(start, start + way * fraction[:, None], shapes)
     return confirmed

@@ -45,7 +45,7 @@ from reference.visibility.planes import Rays
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-MERGE = 1e-12  #: gaps between shadows below this share of 1 + |x| are rounding
+MERGE = 1e-12  #: gaps between shadows below this fraction of 1 + |x| are rounding
 _SLOTS = 16  # lit intervals of a ray; more where they do not suffice
 _STORED = 1 << 23  # shadows of all lanes at once
 
@@ -202,9 +202,10 @@ def _triangle(lanes: _Lanes, corners: Any, number: Any) -> tuple[Any, Any]:
         return a, b, c
 
     s = ordered(side)
-    shares = [s[0] / (s[0] - s[k]) for k in (1, 2)]
+    fractions = [s[0] / (s[0] - s[k]) for k in (1, 2)]
     (y0, y1), (z0, z1) = (
-        [(1 - share) * v[0] + share * v[k] for k, share in enumerate(shares, 1)] for v in (ordered(y), ordered(z))
+        [(1 - fraction) * v[0] + fraction * v[k] for k, fraction in enumerate(fractions, 1)]
+        for v in (ordered(y), ordered(z))
     )
     return _segment(lanes, (z0, y0), (z1, y1), cut)
 

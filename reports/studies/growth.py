@@ -119,7 +119,7 @@ def _draw_scaling(records: list[Scaling], column: str) -> Any:
 # The size of the shadow map
 
 _FEW = "has too few values above 0"
-_SHARES = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=FRACTION)
+_FRACTIONS = numbers(relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="", p99="", max="", how=FRACTION)
 
 
 @with_kernels
@@ -191,7 +191,7 @@ def map_size(
             errors.append({"map": texels[number], **vars(row.error)})
         rows += [{"scene": scene.name, "label": label, **each} for each in errors]
         title = "{}, {} x {}, {}: error".format(scene.name, *scene.size, label)
-        tables.append(table(title, (*numbers("map"), *_SHARES), errors))
+        tables.append(table(title, (*numbers("map"), *_FRACTIONS), errors))
         exponent, scatter = fitted_exponent(texels, [each["relative_rmse"] for each in errors])
         power = f"falls as size^-({-exponent:.2f} +- {scatter:.1g})"
         said.append(f"{scene.name}: the relative RMSE {power if math.isfinite(exponent) else _FEW}.")

@@ -78,7 +78,7 @@ def noise(
         *numbers(root_bias="bias by pixel", noise="noise", relative_rmse="rel. RMSE", how=FRACTION),
         *numbers(efficiency="efficiency [1/s]"),
         *words(until=f"to {100 * _GOAL:g} %"),
-        *numbers(low_share="low frequencies", how={"digits": 2}),
+        *numbers(low_fraction="low frequencies", how={"digits": 2}),
         *numbers(blurred=f"RMSE blurred, {BLURS[middle]:g} px", how=FRACTION),
     )
     title = f"{loaded.name}: errors of one frame, relative to the mean of the reference"

@@ -32,7 +32,7 @@ def worst_by_tag(cases, relative):
     return {str(tag): float(relative[tags == tag].max()) for tag in np.unique(tags)}
 
 
-# Tolerances: the panels are right to rounding, of which the exponent, up to 70 in these files, has the largest share
+# Tolerances: the panels are right to rounding, of which the exponent, up to 70 in these files, has the largest fraction
 # (1e-14); the rays add the rounding of the foot point, eps |light - origin|, times the steepness of the integrand.
 @pytest.mark.claim(
     "integral-certified", tolerance="2e-14 relative, 1e-12 where rays are given as vectors; 1e-10 is asked for"
@@ -82,9 +82,9 @@ def close(a, b, *, relative=2e-10):
 @pytest.mark.claim("laws-of-the-integral", tolerance="the sum of the estimates")
 @settings(deadline=None)
 @given(segments, st.floats(min_value=0.01, max_value=0.99))
-def test_segments_add_up(segment, share):
+def test_segments_add_up(segment, fraction):
     foot, height, x0, length, sigma_t, phase = segment
-    middle = x0 + share * length
+    middle = x0 + fraction * length
     value, error = airlight_segments(
         foot, height, np.array([x0, x0, middle]), np.array([x0 + length, middle, x0 + length]), sigma_t, phase
     )

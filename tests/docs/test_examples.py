@@ -238,7 +238,7 @@ def test_what_is_set_wrong_in_cycles_is_named(variant, tmp_path, monkeypatch):
     """A right image, and faults of the medium, the light, the camera and the values."""
     from validation.engine.diagnose import diagnose_file
 
-    planted = {
+    injected = {
         "right": "right",
         "extinction-0.9": "extinction",
         "near-0.1": "near-plane",
@@ -251,6 +251,7 @@ def test_what_is_set_wrong_in_cycles_is_named(variant, tmp_path, monkeypatch):
     python = interpreter("cycles")
     monkeypatch.syspath_prepend(str(DOCS / "tools"))
     render_faults = importlib.import_module("cycles_round_trips").render_faults
-    render_faults(python, "sphere-spot", tmp_path, samples=256, size=(80, 60), faults=list(planted))
-    named = {fault: diagnose_file(tmp_path / f"{fault}.exr", "sphere-spot", pixel="area")[0].first for fault in planted}
-    assert named == planted
+    render_faults(python, "sphere-spot", tmp_path, samples=256, size=(80, 60), faults=list(injected))
+    images = {fault: tmp_path / f"{fault}.exr" for fault in injected}
+    named = {fault: diagnose_file(image, "sphere-spot", pixel="area")[0].first for fault, image in images.items()}
+    assert named == injected

@@ -19,7 +19,7 @@ ray at the height h over the centre, whose foot is at the distance `foot`, is
 
 **How much of a flat light a surface point sees.** Seen from the point, an edge of an occluder falls on a line in the
 plane of the light, and a convex polygon on a convex polygon. Of a disk, a line at the signed distance u (in radii) from
-the centre leaves the share (acos u - u sqrt(1 - u^2))/pi; what a polygon covers is added up edge by edge as signed
+the centre leaves the fraction (acos u - u sqrt(1 - u^2))/pi; what a polygon covers is added up edge by edge as signed
 triangles and sectors. Of a rectangle, polygons are clipped (Sutherland, Hodgman 1974) and measured (Gauss's shoelace).
 """
 
@@ -87,8 +87,8 @@ def sphere_fluence(sigma_t: float, distance: ArrayLike, radius: float) -> Array:
     return np.asarray(np.pi / d * 0.5 * width * (f @ _WEIGHTS))
 
 
-def disk_share(offset: ArrayLike) -> Array:
-    """Return the share of a disk beyond a line at signed distances from its centre, in radii."""
+def disk_fraction(offset: ArrayLike) -> Array:
+    """Return the fraction of a disk beyond a line at signed distances from its centre, in radii."""
     u = np.clip(np.asarray(offset, dtype=np.float64), -1.0, 1.0)
     return np.asarray((np.arccos(u) - u * np.sqrt((1 - u) * (1 + u))) / np.pi)
 

@@ -198,7 +198,7 @@ def _to_camera(reference, hits):
     return np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * reference.medium.sigma_t
 
 
-def _no_shadow_leg(function, reference, hits, named):
+def _no_shadow_segment(function, reference, hits, named):
     return function(reference, hits, **named | {"shadow_scale": 0.0})
 
 
@@ -264,7 +264,7 @@ def _sorted(emitters_are_opaque: bool) -> Wrap:
 # --- Hooks of single-scatter ---
 
 
-def _leg(change: Callable[..., Any]) -> Wrap:
+def _segment(change: Callable[..., Any]) -> Wrap:
     """Change the attenuation between light and point: change(media)."""
     return Wrap(
         f"{_TRACED}.boundary_walk:transmittance",
@@ -282,12 +282,12 @@ def _equal_cells(function, number, shift, count):
     return low, mi.Float(1 / (count - 1))
 
 
-def _clear_leg(function, *arguments, **named):
+def _clear_segment(function, *arguments, **named):
     return dr.select(function(*arguments, **named) > 0, mi.Spectrum(1), mi.Spectrum(0))
 
 
 #: The way from the camera to a sample left out, and the scattering angle turned round, whatever the light.
-_BRIGHT_CAMERA_LEG = Rewrite(
+_BRIGHT_CAMERA_SEGMENT = Rewrite(
     _ESTIMATOR, "part.kept(sample.x, a_, b_, c_, d_, e_)", "part.kept(part.start, a_, b_, c_, d_, e_)"
 )
 _TRACED_BACKWARD = Rewrite(
@@ -332,8 +332,8 @@ _FOG = _all(
         "one-per-cent": _brighter(1.01),
         "three-per-mille": _brighter(1.003),
         "one-per-mille": _brighter(1.001),
-        "bright-shadow-leg": _terms(lambda *_: {"shadow_scale": 0.0}),
-        "bright-camera-leg": _times(lambda x, foot, height, sigma_t: np.exp(np.minimum(sigma_t * x, 600.0))),
+        "bright-shadow-segment": _terms(lambda *_: {"shadow_scale": 0.0}),
+        "bright-camera-segment": _times(lambda x, foot, height, sigma_t: np.exp(np.minimum(sigma_t * x, 600.0))),
         "distance-not-squared": _times(lambda x, foot, height, sigma_t: np.hypot(x - foot, height)),
         "end-at-one-optical-depth": _stretches(lambda rays, x0, x1, sigma_t: (x0, np.minimum(x1, 1 / sigma_t))),
         "near-clip": _stretches(lambda rays, x0, x1, sigma_t: (np.maximum(x0, 0.2), x1)),
@@ -356,15 +356,15 @@ _FOG = _all(
             "reference.quadrature.light_airlight:light_airlight",
             lambda function, reference, light, distance, **how: function(reference, light, distance + np.inf, **how),
         ),
-        "surface-bright-shadow-leg": _surface(_no_shadow_leg),
-        "surface-bright-camera-leg": _surface(
+        "surface-bright-shadow-segment": _surface(_no_shadow_segment),
+        "surface-bright-camera-segment": _surface(
             lambda function, reference, hits, named: (
                 function(reference, hits, **named) * np.exp(_to_camera(reference, hits))
             )
         ),
-        "surface-wrong-leg": _surface(
+        "surface-wrong-segment": _surface(
             lambda function, reference, hits, named: (
-                _no_shadow_leg(function, reference, hits, named) * np.exp(-_to_camera(reference, hits))
+                _no_shadow_segment(function, reference, hits, named) * np.exp(-_to_camera(reference, hits))
             )
         ),
         "surface-without-shadows": _surface(_all_reached),
@@ -399,7 +399,7 @@ _SUN = _all(
             _FIELD,
             lambda function, *arguments, **named: tuple(_FOUR_PI * part for part in function(*arguments, **named)),
         ),
-        "directional-bright-leg": Rewrite(
+        "directional-bright-segment": Rewrite(
             _MEDIA, "body_.length(rows_, x_, r_, limit_)", "0 * body_.length(rows_, x_, r_, limit_)"
         ),
         "directional-chord-both-ways": Rewrite(_MEDIA, "np.maximum(enter, 0.0)", "enter"),
@@ -412,7 +412,7 @@ _SUN = _all(
         ),
         "directional-no-shadows": _sun(lambda near: replace(near, triangles=_none(near.triangles))),
         "directional-no-sphere-shadows": _sun(lambda near: replace(near, spheres=_none(near.spheres))),
-        "directional-surface-bright-leg": Rewrite(
+        "directional-surface-bright-segment": Rewrite(
             "reference.quadrature.surface", "to_camera_ + optical_depth(a_, b_, c_, d_, e_)", "to_camera_"
         ),
     },
@@ -439,7 +439,7 @@ _WIDE = _all(
         "area-null-is-opaque": _sorted(True),
         "area-black-is-clear": _sorted(False),
         "area-surface-both-sides": Wrap(f"{_SAMPLES}:sections_for_points", _for_points),
-        "area-surface-bright-leg": Rewrite(
+        "area-surface-bright-segment": Rewrite(
             _WEIGHTED, "value_ * np.exp(-shadow_) * weight_[:, None]", "value_ * weight_[:, None]"
         ),
         "area-surface-without-shadows": Wrap("reference.quadrature.area_lights:seen_samples", _through_everything),
@@ -459,9 +459,9 @@ _TRACED_FOG = _all(
         "traced-distance-not-squared": Rewrite(
             _SOURCES, "1 / (square_ * density_)", "1 / (dr.sqrt(square_) * density_)"
         ),
-        "traced-bright-shadow-leg": _leg(lambda media: replace(media, end_sigma_t=0 * media.end_sigma_t)),
-        "traced-bright-camera-leg": _BRIGHT_CAMERA_LEG,
-        "leg-before-the-cone-forgotten": Rewrite(
+        "traced-bright-shadow-segment": _segment(lambda media: replace(media, end_sigma_t=0 * media.end_sigma_t)),
+        "traced-bright-camera-segment": _BRIGHT_CAMERA_SEGMENT,
+        "segment-before-the-cone-forgotten": Rewrite(
             _SOURCES, "Sample(low_ + y_, a_, b_, c_, d_, e_)", "Sample(part.start + y_, a_, b_, c_, d_, e_)"
         ),
         "traced-forward-is-backward": _TRACED_BACKWARD,
@@ -473,7 +473,7 @@ _TRACED_FOG = _all(
         "traced-surface-not-squared": Rewrite(
             _SOURCES, "self.sent(light_, hit_, way_) / (r_ * r_)", "self.sent(light_, hit_, way_) / r_"
         ),
-        "traced-surface-bright-camera-leg": Rewrite(
+        "traced-surface-bright-camera-segment": Rewrite(
             _ESTIMATOR, "part.kept(x, hit, a_, b_, c_, d_)", "part.kept(part.start, hit, a_, b_, c_, d_)"
         ),
     },
@@ -483,7 +483,7 @@ _TRACED_MESHES = _all(
     "single-scatter",
     "two-pens",
     {
-        "traced-shadow-epsilon": _leg(lambda media: replace(media, end_sigma_t=(1 - 8.94e-4) * media.end_sigma_t)),
+        "traced-shadow-epsilon": _segment(lambda media: replace(media, end_sigma_t=(1 - 8.94e-4) * media.end_sigma_t)),
         "traced-short-shadow-rays": Put(f"{_TRACED}.boundary_walk:_SHORT_OF_POINT", 0.1),
     },
 )
@@ -493,8 +493,8 @@ _TRACED_SUN = _all(
     "sun",
     {
         "traced-directional-uniform-density": Rewrite(_TRACED, "0.5 / length_ + share_ * sum(pdfs_)", "1 / length_"),
-        "traced-directional-bright-leg": Wrap(f"{_TRACED}.boundary_walk:transmittance", _clear_leg),
-        "traced-directional-bright-camera-leg": _BRIGHT_CAMERA_LEG,
+        "traced-directional-bright-segment": Wrap(f"{_TRACED}.boundary_walk:transmittance", _clear_segment),
+        "traced-directional-bright-camera-segment": _BRIGHT_CAMERA_SEGMENT,
         "traced-directional-forward-is-backward": _TRACED_BACKWARD,
     },
 )
@@ -519,7 +519,7 @@ _TRACED_WIDE = _all(
             f"{_TRACED}.area_sampling:AreaLight.area",
             lambda function, light: function(light) / (4 if light.shape == "Sphere" else 1),
         ),
-        "traced-area-bright-camera-leg": _BRIGHT_CAMERA_LEG,
+        "traced-area-bright-camera-segment": _BRIGHT_CAMERA_SEGMENT,
         "traced-area-forward-is-backward": _TRACED_BACKWARD,
         "traced-area-surface-wrong-count": Rewrite(
             _ESTIMATOR, "material_ * irradiance_ * kept_ / count_", "material_ * irradiance_ * kept_ / (count_ - 1)"

@@ -24,7 +24,7 @@ from analytic.geometry import foot_and_height
 from reference.quadrature.ray_values import ray_values
 from reference.quadrature.replicates import PointPlan
 from tests.evidence.certified.model import SIZE, FogLight, load_fog, mitsuba_dict
-from tests.evidence.closed_forms import disk_share, polygon_in_disk, polygon_overlap
+from tests.evidence.closed_forms import disk_fraction, polygon_in_disk, polygon_overlap
 from tests.evidence.known_answers import (
     BOX,
     SCENES,
@@ -47,7 +47,7 @@ from tests.evidence.known_answers import (
     sun,
     white,
 )
-from tests.helpers.area_lights import visible_share
+from tests.helpers.area_lights import visible_fraction
 
 EXACT = 1e-10  # the tolerance of the integrals
 FLOAT32 = 2e-5  # of single precision, which rounds otherwise after a change; the random numbers are the same
@@ -129,8 +129,8 @@ def floor_distance(reference) -> np.ndarray:
         distance = -reference.origin[2] / reference.direction[:, 2]
     point = reference.origin + np.where(distance > 0, distance, 0)[:, None] * reference.direction
     u, v = (np.array(edge[:2]) for edge in floor().half_edges)
-    share = np.linalg.solve(np.stack([u, v], axis=1), (point[:, :2] - np.array(floor().centre[:2])).T)
-    return np.where((distance > 0) & np.all(np.abs(share) < 1, axis=0), distance, np.inf)
+    fraction = np.linalg.solve(np.stack([u, v], axis=1), (point[:, :2] - np.array(floor().centre[:2])).T)
+    return np.where((distance > 0) & np.all(np.abs(fraction) < 1, axis=0), distance, np.inf)
 
 
 @pytest.mark.claim("known-answers")
@@ -199,14 +199,14 @@ def test_a_floor_in_an_absorbing_medium(variant):
     (_, bright), (nothing, surface) = layers(clear), layers(dim)
     assert np.all(nothing == 0)
     # The floor is met at (corner - origin) . n / (direction . n) in float32. Dot products and quotient round seven
-    # times, a distance d is off by that share of d, and the path from light to camera by twice as much at most.
+    # times, a distance d is off by that fraction of d, and the path from light to camera by twice as much at most.
     allowed = 2 * sigma_t * end[hit, None] * 7 * 2.0**-24
     assert np.all(np.abs(surface[hit] / bright[hit] / np.exp(-sigma_t * path)[:, None] - 1) <= allowed)
 
 
 @pytest.mark.claim("known-answers")
 def test_a_box_of_fog_under_vertical_light(variant):
-    """The leg from a height z goes straight up to the lid at z_1.
+    """The segment from a height z goes straight up to the lid at z_1.
 
     A ray that is in the box from (height z_0) on for the length l, and rises by w_z a metre, has
     tau = sigma_t (z_1 - z_0 + (1 - w_z) y) after y metres, so
@@ -290,15 +290,15 @@ def test_what_a_polygon_leaves_of_a_light(variant, kind, corners):
     light = replace(reference.area[0], centre=np.array([*middle, 4.0]), half=half, frame=np.diag([1.0, 1.0, -1.0]))
     reference = replace(reference, area=(light,), occluders=lid(corners, 2.0))
     place = np.array([[-0.375, 0.25, 0], [-0.1875, 0.125, 0], [0.0, 0.0625, 0], [0.125, 0.25, 0], [0.3125, 0.125, 0]])
-    share = visible_share(reference, place, [0.0, 0.0, 1.0], 4096).mean(axis=1)
+    fraction = visible_fraction(reference, place, [0.0, 0.0, 1.0], 4096).mean(axis=1)
     # A corner at half the height is twice as far from the foot of the point where it falls on the light's plane.
     fallen = [foot + 2 * (corners - foot) - middle for foot in place[:, :2]]
     if kind == "disk":
-        expected = [1 - float(disk_share(shape[0, 0] / half[0])) for shape in fallen]
+        expected = [1 - float(disk_fraction(shape[0, 0] / half[0])) for shape in fallen]
         assert expected[2] == pytest.approx(1 - polygon_in_disk(fallen[2] / half[0]) / math.pi, abs=1e-9)
     else:
         sides = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         expected = [1 - polygon_overlap(shape, sides) / (4 * half[0] * half[1]) for shape in fallen]
     # Three standard errors of 8 x 64 sections, 1.65e-3 measured over 24 seeds, at the least rate: as N^-1 where an edge
     # of the shadow is along the sections of one of the replicates, else as N^-3/2.
-    np.testing.assert_allclose(share, expected, atol=3 * 1.65e-3 * 64 / 4096, rtol=0)
+    np.testing.assert_allclose(fraction, expected, atol=3 * 1.65e-3 * 64 / 4096, rtol=0)

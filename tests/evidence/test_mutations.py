@@ -91,12 +91,12 @@ def test_volpath_finds_gross_faults_and_no_others(stage_of):
     stage = stage_of("many-lights")
     by_name = {mutation.name: mutation for mutation in MUTATIONS}
     assert all(sighting.agrees for sighting in stages.volpath_seen(None, stage, 32))
-    for name in ("no-four-pi", "bright-shadow-leg", "forward-is-backward", "surface-bright-camera-leg"):
+    for name in ("no-four-pi", "bright-shadow-segment", "forward-is-backward", "surface-bright-camera-segment"):
         assert not all(sighting.agrees for sighting in stages.volpath_seen(by_name[name], stage, 32)), name
 
 
 @pytest.mark.slow
-def test_agreement_is_blind_to_what_all_share(stage_of):
+def test_agreement_is_blind_to_what_all_fraction(stage_of):
     stage = stage_of("many-lights")
     mutation = next(mutation for mutation in SHARED if mutation.name == "camera-mirrored")
     with injected(mutation.change):
@@ -123,7 +123,7 @@ def furthest(certified):
 
 
 @pytest.mark.parametrize("mutation", SHARED, ids=lambda mutation: mutation.name)
-def test_the_certified_scenes_find_what_all_share(certified, mutation):
+def test_the_certified_scenes_find_what_all_fraction(certified, mutation):
     assert furthest(certified) < 1e-9  # the tolerance of the integrals, 1e-10, and twelve digits
     with injected(mutation.change):
         assert furthest(certified) > 1e-3

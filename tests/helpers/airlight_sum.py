@@ -80,8 +80,8 @@ def airlight_sum(
 ) -> Array:
     """Return the airlight of one ray, (3,) [W/(m^2 sr)]; `around` is the medium outside of the bodies, if there is one.
 
-    `lit` tells of points whether the light reaches them; the leg from a point light is attenuated over `shadow_scale`
-    of its length, as seen from the point. Bodies must not overlap.
+    `lit` tells of points whether the light reaches them; the segment from a point light is attenuated over
+    `shadow_scale` of its length, as seen from the point. Bodies must not overlap.
     """
     outside = np.zeros(3) if around is None else np.broadcast_to(around.sigma_t, 3)
     chords = [tuple(np.maximum(x, 0.0) for x in body.chord(origin, direction)) for body in bodies]

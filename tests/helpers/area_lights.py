@@ -98,8 +98,8 @@ def lit_room(light, *, size=(5, 4), medium=None, empty=False, **shapes: Any) -> 
     return read_reference(lit_scene(size=size, to_world=camera, medium=medium, lamp=light, **chosen))
 
 
-def visible_share(reference: ReferenceScene, place, normal, samples: int):
-    """Return the share of the area of the first light, a flat one, that surface points see, (points, replicates) [1].
+def visible_fraction(reference: ReferenceScene, place, normal, samples: int):
+    """Return the fraction of the area of the first, flat light that surface points see, (points, replicates) [1].
 
     A camera looks down on each point along its normal.
     """

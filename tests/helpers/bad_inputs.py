@@ -285,7 +285,7 @@ def _fault(order: list[str]) -> str:
         if written is not None and not _finite_file(written):
             return f"{written.name} is not finite"
     elif status == 2 and not any(
-        word in said for word in ("wanted", "move", "give", "use ", "reference ", "cannot", "finite", "mend")
+        word in said for word in ("wanted", "move", "give", "use ", "reference ", "cannot", "finite", "repair")
     ):
         return f"says nothing of what is wanted: {said}"
     elif status not in (1, 2):

@@ -7,7 +7,7 @@ and standard error follow from the batches as a renderer's do. Then
 
 * without a bias (`calibrate`) each test must reject as often as its level says, the intervals must hold the true value
   as often as they say, and the p-values of many comparisons must be uniform (Kolmogorov and Smirnov);
-* with a bias (`power_and_finds`) the share of comparisons that find it must be the power that each of them predicts
+* with a bias (`power_and_finds`) the fraction of comparisons that find it must be the power that each of them predicts
   from its own standard error.
 
 **How far this holds.** Batch means of path tracers are skewed. With errors of a batch that are log-normal with the
@@ -107,14 +107,14 @@ def problems(rates: dict[str, float], experiment: Experiment, level: float = 1e-
     wrong = {name: rates[name] for name in ("bias_uniformity", "uniformity_uniformity") if rates[name] < level}
     for name, expected in EXPECTED.items():
         trials = experiment.runs * experiment.size**2 if name == "exceeding" else experiment.runs
-        low, high = share_interval(expected, trials, level)
+        low, high = fraction_interval(expected, trials, level)
         if not (name == "exceeding_alarms" or low <= rates[name]) or rates[name] > high:
             wrong[name] = rates[name]
     return wrong
 
 
 def power_and_finds(bias: float, experiment: Experiment, *, spread: float) -> tuple[float, float]:
-    """Inject a bias into many images; return the mean power that was predicted, and the share that found it."""
+    """Inject a bias into many images; return the mean power that was predicted, and the fraction that found it."""
     comparisons = _comparisons(experiment, bias, spread)
     predicted = [power(bias / s.relative_bias_se, s.relative_bias_freedom) for s in comparisons]
     return float(np.mean(predicted)), float(np.mean([s.relative_bias_p < 0.05 for s in comparisons]))
@@ -133,7 +133,7 @@ def spread_to_detect(bias: float, experiment: Experiment) -> float:
     return abs(bias) / 3.2415 / error
 
 
-def share_interval(probability: float, trials: int, level: float) -> tuple[float, float]:
+def fraction_interval(probability: float, trials: int, level: float) -> tuple[float, float]:
     """Return between which shares an event of that probability falls with probability 1 - level."""
     low, high = binom.interval(1 - level, trials, probability)
     return float(low) / trials, float(high) / trials

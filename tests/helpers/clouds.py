@@ -91,8 +91,8 @@ def linear_between(values, low, high, points):
     counts = np.array(values.shape[::-1])
     place = np.clip((points - np.asarray(low)) / (np.asarray(high) - np.asarray(low)) * counts - 0.5, 0, counts - 1)
     cell = np.minimum(place.astype(int), np.maximum(counts - 2, 0))
-    share, total = place - cell, np.zeros(len(points))
+    fraction, total = place - cell, np.zeros(len(points))
     for corner in np.ndindex(2, 2, 2):
         x, y, z = np.minimum(cell + corner, counts - 1).T
-        total += np.where(corner, share, 1 - share).prod(axis=1) * values[z, y, x]
+        total += np.where(corner, fraction, 1 - fraction).prod(axis=1) * values[z, y, x]
     return total

@@ -18,7 +18,7 @@ def lamp(shape="rectangle", *, size=0.31, radiance=(5.0, 4.0, 3.0)):
 
 
 def lamp_scene(shape="rectangle", **changes):
-    """Return the tiny scene with a area light for its point light."""
+    """Return the tiny scene with an area light for its point light."""
     return tiny_scene(**({"lamp": lamp(shape)} | changes))
 
 
@@ -33,7 +33,7 @@ def area_lamp(kind: str, *, size: Any = (0.31, 0.17), material: Any = None, **ch
 
 
 def lit_by(kind: str = "rectangle", *, size: Any = 0.23, changes: Any = None, **of_lamp: Any) -> dict[str, Any]:
-    """Return the tiny scene with triangles for occluders, under a area light alone."""
+    """Return the tiny scene with triangles for occluders, under an area light alone."""
     ball = {
         "type": "cube",
         "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.57]).rotate([1, 2, 3], 37).scale(0.29),

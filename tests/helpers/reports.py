@@ -60,8 +60,8 @@ def growth_record(
 
 def errors(relative_rmse: float | None, **changes: Any) -> dict[str, Any]:
     """Return the errors of an image, all in proportion; no number where there is none."""
-    shares = {"relative_bias": 0.1, "rmse": 0.1, "relative_rmse": 1.0, "p50": 0.5, "p99": 3.0, "max": 10.0}
-    scaled = {name: None if relative_rmse is None else share * relative_rmse for name, share in shares.items()}
+    fractions = {"relative_bias": 0.1, "rmse": 0.1, "relative_rmse": 1.0, "p50": 0.5, "p99": 3.0, "max": 10.0}
+    scaled = {name: None if relative_rmse is None else fraction * relative_rmse for name, fraction in fractions.items()}
     return {"pixels": 76800, "bias": 1e-4, "nonfinite": 0, "negative": 0} | scaled | changes
 
 
@@ -77,7 +77,7 @@ def entry(label: str, relative_rmse: float | None = 0.01, median: float = 2.0, *
     kernel = inside.rstrip(")").split(", ")[0]
     made = {"label": label, "kind": "built-in", "layer": "airlight", "method": name, "parameters": {}, "files": {}}
     made |= {"kernel": kernel if kernel and "=" not in kernel else None, "knows_shadows": True, "left_out": False}
-    made |= {"times": {stage: timing(share * median) for stage, share in _STAGES.items()}}
+    made |= {"times": {stage: timing(fraction * median) for stage, fraction in _STAGES.items()}}
     made |= {"error": errors(relative_rmse), "measured": WHEN, "seconds": 1.5, "cached": False}
     return made | dict.fromkeys(("refused", "note", "surface_error", "flip")) | changes
 
@@ -120,8 +120,8 @@ def reference(**changes: Any) -> dict[str, Any]:
     return {"mean": 1.0, "relative_bound": 1e-10, "missed": 0.0} | counts | changes
 
 
-def share(value: float) -> dict[str, Any]:
-    """Return a share of the light with its interval."""
+def fraction(value: float) -> dict[str, Any]:
+    """Return a fraction of the light with its interval."""
     return {"value": value, "interval": [value - 0.003, value + 0.003]}
 
 
@@ -130,7 +130,7 @@ def scene(name: str, methods: list[dict[str, Any]], **changes: Any) -> dict[str,
     made = {"name": name, "purpose": f"A {name}.", "published": "", "path": None, "notes": [], "exposure": 1.0}
     made |= {"size": [320, 240], "timed": [320, 240], "reference": reference(), "methods": methods}
     made |= {"plan": {"shadows": "visibility tests", "medium": "unbounded", "lights": "1 point", "extinction": "one"}}
-    multiple = {"medium": share(0.123), "everything": share(0.21), "max_depth": 64, "batches": 4, "samples": 1}
+    multiple = {"medium": fraction(0.123), "everything": fraction(0.21), "max_depth": 64, "batches": 4, "samples": 1}
     made |= {"agreement": {"volpath airlight": agreement()}, "multiple": multiple, "seconds": {"reference": 0.5}}
     files = {"exr": "reference.exr", "picture": "reference.png", "airlight": "reference-airlight.png"}
     return made | {"files": {kind: f"{name}/{file}" for kind, file in files.items()}} | changes
@@ -176,19 +176,19 @@ def sampled(samples) -> dict[str, Any]:
 def times(frame_ms: float, rng: np.random.Generator | None = None, *, busy: float = 0.0) -> dict[str, Any]:
     """Return the times of a configuration.
 
-    Without a generator exact ones. A machine that is busy now and then, by the share `busy`, adds up to three times the
-    work to whole timings, and to single repetitions of the others: both were seen.
+    Without a generator exact ones. A machine that is busy now and then, by the fraction `busy`, adds up to three times
+    the work to whole timings, and to single repetitions of the others: both were seen.
     """
     stages = {}
-    for stage, share in _STAGES.items():
-        count = 40 if share <= 1 else 12
-        samples = np.full(count, frame_ms * share)
+    for stage, fraction in _STAGES.items():
+        count = 40 if fraction <= 1 else 12
+        samples = np.full(count, frame_ms * fraction)
         if rng is not None:
             samples *= 1 + 0.01 * rng.exponential(size=count)
             if rng.random() < busy:
                 samples *= 1 + rng.uniform(0.3, 1.0)
             hit = rng.random(count) < busy * rng.uniform(0.5, 2.0)
-            samples += hit * frame_ms * share * rng.uniform(0.5, 3.0, size=count)
+            samples += hit * frame_ms * fraction * rng.uniform(0.5, 3.0, size=count)
         stages[stage] = sampled(samples)
     return stages
 

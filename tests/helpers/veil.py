@@ -20,7 +20,7 @@ class Veil(Method):
     carries = True
     at_once = True
 
-    share: float = parameter(0.5, "fraction of every light that reaches the surfaces", least=0, most=1)
+    fraction: float = parameter(0.5, "fraction of every light that reaches the surfaces", least=0, most=1)
     veil: float = parameter(0.8, "transmittance of the veil", above=0, most=1)
     keep: float = parameter(0.25, "weight of the last frame", least=0, below=1)
 
@@ -35,5 +35,5 @@ class Veil(Method):
         if view.carried is not None:
             glow = dr.lerp(glow, view.carried, self.keep)
         background = dr.select(dr.isfinite(view.distance), Color(0), Color(0.3, 0.4, 0.5))
-        shares = tuple(self.share for _ in view.lights)
-        return Layers(glow, shares, Color(self.veil), background, carried=glow)
+        fractions = tuple(self.fraction for _ in view.lights)
+        return Layers(glow, fractions, Color(self.veil), background, carried=glow)

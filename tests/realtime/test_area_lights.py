@@ -49,19 +49,19 @@ def test_means_over_many_points_are_those_over_the_light(kind, pattern):
     """Second moments: a^2/3 of half a side, R^2/4 of a disk, R^2/3 of a sphere."""
     light = light_of(kind)
     offsets = (place_points(light, 4096, pattern).positions - light.middle) @ AXES.T
-    share = {"rectangle": 1 / 3, "disk": 1 / 4, "sphere": 1 / 3}[kind]
+    fraction = {"rectangle": 1 / 3, "disk": 1 / 4, "sphere": 1 / 3}[kind]
     sizes = [np.linalg.norm(light.across), np.linalg.norm(light.up)]
     np.testing.assert_allclose(offsets.mean(axis=0), 0, atol=2e-3 * sizes[0])
-    np.testing.assert_allclose((offsets[:, :2] ** 2).mean(axis=0), share * np.square(sizes), rtol=3e-3)
+    np.testing.assert_allclose((offsets[:, :2] ** 2).mean(axis=0), fraction * np.square(sizes), rtol=3e-3)
 
 
-@pytest.mark.parametrize(("kind", "share"), [("rectangle", 1 / 3), ("disk", 1 / 4)])
+@pytest.mark.parametrize(("kind", "fraction"), [("rectangle", 1 / 3), ("disk", 1 / 4)])
 @pytest.mark.parametrize("points", [3, 4, 5])
-def test_a_ring_has_the_second_moments_of_its_light(kind, share, points):
+def test_a_ring_has_the_second_moments_of_its_light(kind, fraction, points):
     light = light_of(kind)
     offsets = (place_points(light, points, "ring").positions - light.middle) @ AXES[:2].T
     sizes = np.array([np.linalg.norm(light.across), np.linalg.norm(light.up)])
-    np.testing.assert_allclose(offsets.T @ offsets / points, np.diag(share * sizes**2), atol=1e-12)
+    np.testing.assert_allclose(offsets.T @ offsets / points, np.diag(fraction * sizes**2), atol=1e-12)
     np.testing.assert_allclose(place_points(light, 1, "ring").positions, [light.middle], atol=1e-12)
 
 

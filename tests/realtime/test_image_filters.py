@@ -30,25 +30,25 @@ def slow_bilateral(image, *, hd, guides=(), support=3.0):
                 for c in range(max(column - reach, 0), min(column + reach, width - 1) + 1):
                     exponent = ((r - row) ** 2 + (c - column) ** 2) / hd**2
                     exponent += sum(np.sum((g[r, c] - g[row, column]) ** 2) / w**2 for g, w in guides)
-                    share = np.exp(-0.5 * exponent)
-                    total, weighed = total + share, weighed + share * image[r, c]
+                    fraction = np.exp(-0.5 * exponent)
+                    total, weighed = total + fraction, weighed + fraction * image[r, c]
             filtered[row, column] = weighed / total
     return filtered
 
 
 def slow_tile_average(image, *, guides=()):
     """Return the mean over 5 x 5 pixels, those at the ends with half a weight, weighted by guides."""
-    shares = np.outer([0.5, 1, 1, 1, 0.5], [0.5, 1, 1, 1, 0.5])
+    fractions = np.outer([0.5, 1, 1, 1, 0.5], [0.5, 1, 1, 1, 0.5])
     height, width = image.shape
     averaged = np.empty_like(image, dtype=np.float64)
     for row in range(height):
         for column in range(width):
             total = weighed = 0.0
-            for (down, right), share in np.ndenumerate(shares):
+            for (down, right), fraction in np.ndenumerate(fractions):
                 r, c = row + down - 2, column + right - 2
                 if 0 <= r < height and 0 <= c < width:
-                    share *= np.exp(-0.5 * sum(np.sum((g[r, c] - g[row, column]) ** 2) / w**2 for g, w in guides))
-                    total, weighed = total + share, weighed + share * image[r, c]
+                    fraction *= np.exp(-0.5 * sum(np.sum((g[r, c] - g[row, column]) ** 2) / w**2 for g, w in guides))
+                    total, weighed = total + fraction, weighed + fraction * image[r, c]
             averaged[row, column] = weighed / total
     return averaged
 

@@ -137,7 +137,7 @@ def test_the_nearest_are_kept_in_order_and_the_others_come_out(variant, keys):
 @pytest.mark.claim("nearest-crossings-in-order", tolerance="none: the same bits")
 @settings(deadline=None, max_examples=50)
 @given(keys=KEYS, shift=arrays(np.int64, (QUEUES, COUNT), elements=st.integers(0, LENGTH)))
-def test_exchange_mends_an_order_that_is_wrong_by_no_more_than_its_places(variant, keys, shift):
+def test_exchange_repairs_an_order_that_is_wrong_by_no_more_than_its_places(variant, keys, shift):
     keys = np.take_along_axis(keys, in_order(keys), axis=1)
     # Each comes at most LENGTH later than in order, so none waits for more than these.
     late = np.argsort(np.arange(COUNT) + shift, axis=1, kind="stable")

@@ -63,7 +63,7 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
     function = Frozen(doubled)
     arguments = [dr.opaque(mi.Float, value, 5) for value in (1.0, 2.0, 3.0)]
     assert [float(function(argument)[0]) for argument in arguments] == [2, 4, 6]
-    # What the function names of its surroundings is among its inputs: the list changes, and it is recorded anew.
+    # What the function names of its surroundings is among its inputs: the list changes, and it is recorded again.
     assert seen == [False] * function.n_recordings
     assert seen
 
@@ -81,7 +81,7 @@ def test_an_exception_whose_causes_form_a_circle_is_raised(variant):
 
 
 def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
-    """Dr.Jit records anew where the memory of an array is aligned in another way, and NumPy's is by chance.
+    """Dr.Jit records again where the memory of an array is aligned in another way, and NumPy's is by chance.
 
     The second recording is for vertices that are aligned, after Mitsuba's own, which need not be.
     """

@@ -15,7 +15,7 @@ class Fog(Parameters):
     """One parameter of each kind."""
 
     steps: int = parameter(16, "steps of every ray", least=1, most=64, also=(0,))
-    share: float = parameter(0.5, "share of the light", above=0, below=1, unit="1/m")
+    fraction: float = parameter(0.5, "fraction of the light", above=0, below=1, unit="1/m")
     word: str = parameter("even", "spacing", choices=("even", "uneven"))
     on: bool = parameter(True, "whether at all")
     free: float = parameter(2.0, "anything")
@@ -33,8 +33,8 @@ def refused(words):
     ("given", "words"),
     [
         ({"steps": -1}, "steps: got -1, wanted a whole number from 1 to 64"),
-        ({"share": 0.0}, "share: got 0.0, wanted a finite number above 0 up to, but not, 1 [1/m]"),
-        ({"share": float("nan")}, "share: got nan, wanted"),
+        ({"fraction": 0.0}, "share: got 0.0, wanted a finite number above 0 up to, but not, 1 [1/m]"),
+        ({"fraction": float("nan")}, "share: got nan, wanted"),
         ({"word": "unevn"}, "word: got 'unevn', wanted one of even, uneven; did you mean 'uneven'?"),
         ({"free": -1.0}, "free: wanted on=false with a value below 0"),
         ({"step": 3}, "method fog: got a parameter 'step', wanted one of: steps, share, word, on, free; did you mean"),
@@ -49,7 +49,7 @@ def test_what_cannot_be_used_is_refused_with_what_is_wanted(given, words):
 
 def test_words_become_values():
     parameters = read_parameters(
-        "fog", Fog, {"steps": " 0 ", "share": "0.25", "word": "uneven", "on": "no", "free": -1}
+        "fog", Fog, {"steps": " 0 ", "fraction": "0.25", "word": "uneven", "on": "no", "free": -1}
     )
-    assert values(parameters) == {"steps": 0, "share": 0.25, "word": "uneven", "on": False, "free": -1.0}
+    assert values(parameters) == {"steps": 0, "fraction": 0.25, "word": "uneven", "on": False, "free": -1.0}
     assert values(read_parameters("fog", Fog, {})) == defaults(Fog)

@@ -107,7 +107,7 @@ AXIS = np.array([0.31, 0.23, -0.92]) / np.linalg.norm([0.31, 0.23, -0.92])
 
 
 def aimed(degrees, excess, distance, rng):
-    """Return unit directions to points beside the light's cone, at a share `excess` of its radius within it.
+    """Return unit directions to points beside the light's cone, at a fraction `excess` of its radius within it.
 
     A ray to a point of a cone does not graze it there, unless the plane through the ray and the light does: the points
     are where the tangent planes from the camera meet the cone.
@@ -190,7 +190,7 @@ def test_rays_that_graze_the_cone(variant, degrees, precision):
         # One rounding of the distances; A and C lose up to 2/cos^2 (see `realtime.rays`). Measured 1.5.
         assert np.max(error) < 4 * np.finfo(np.float32).eps
     else:
-        # The rounding errors of the test's own directions are not known: a chord loses its share of them.
+        # The rounding errors of the test's own directions are not known: a chord loses its fraction of them.
         assert np.max(error * np.sqrt(np.abs(excess))) < 4 * np.finfo(np.float64).eps
 
 

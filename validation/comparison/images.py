@@ -201,8 +201,8 @@ def statistics_lines(s: Statistics) -> list[str]:
         lines.append(f"margin           +-{percent(s.margin)}: {'inside' if s.equivalent else 'NOT inside'}")
     return [
         *lines,
-        f"variance         {percent(s.reference_variance_share)} of it the reference's; one pixel has up to "
-        f"{percent(s.largest_share)}",
+        f"variance         {percent(s.reference_variance_fraction)} of it the reference's; one pixel has up to "
+        f"{percent(s.largest_fraction)}",
         f"zero reference   {s.zero_reference} values, the test image there up to "
         f"{shown(s.zero_reference_error, 3)} of the mean",
         f"z                mean {_fixed(s.z_mean)}, standard deviation {_fixed(s.z_std)}, {s.tested} values; "

@@ -25,7 +25,7 @@ _STEP = 1.5  # ratio of neighbours across an edge
 _BENT = 0.05  # of the largest of one over the depth: by how much it bends at the outline of a shape
 _WIDE = 4  # pixels from an outline: as far as low resolutions and filters carry an error
 _MORE = 1.7  # how much larger the error is where it lies than all over the image
-_SHARE = 0.5  # of the error, that lies there
+_FRACTION = 0.5  # of the error, that lies there
 _RINGS = 0.5  # fraction of the squared error that only depends on the angle to a light
 _PLACES = (("upper", "middle", "lower"), ("left", "middle", "right"))
 
@@ -34,8 +34,8 @@ _PLACES = (("upper", "middle", "lower"), ("left", "middle", "right"))
 class ErrorPlace:
     """Where most of the squared error of an image lies."""
 
-    pixels: int  #: the fewest that have `share` of it
-    share: float
+    pixels: int  #: the fewest that have `fraction` of it
+    fraction: float
     worst: tuple[int, int]  #: column and row of the pixel with the largest error, from the upper left
     kind: str  #: 'lamp', 'edge' or '' for neither
     relative_rmse_without: float  #: the relative rmse of all other pixels
@@ -51,14 +51,14 @@ class ErrorPlace:
         kinds = {"lamp": "beside a light", "edge": "at edges of light and shadow"}
         if not self.few:
             where = f", most of them {kinds[self.kind]}" if self.kind else ""
-            return f"spread: {100 * self.share:.3g} % of the squared error in {self.pixels} pixels{where}"
+            return f"spread: {100 * self.fraction:.3g} % of the squared error in {self.pixels} pixels{where}"
         single = self.pixels == 1
         place = f"{kinds[self.kind]}, " if self.kind else ""
         at = "" if single else "the worst "
         return (
-            f"{100 * self.share:.3g} % of the squared error in {self.pixels} pixel{'s' * (not single)} ({place}{at}in "
-            f"column {self.worst[0]}, row {self.worst[1]}); without {'it' if single else 'them'} the relative rmse is "
-            f"{100 * self.relative_rmse_without:.3g} %"
+            f"{100 * self.fraction:.3g} % of the squared error in {self.pixels} pixel{'s' * (not single)} ({place}{at}"
+            f"in column {self.worst[0]}, row {self.worst[1]}); without {'it' if single else 'them'} the relative rmse "
+            f"is {100 * self.relative_rmse_without:.3g} %"
         )
 
 
@@ -133,8 +133,8 @@ def _lies(size: Array, here: Bools) -> bool:
     if not 0.001 < here.mean() < 0.7 or size.sum() <= 0:
         return False
     inside, outside = float(size[here].mean()), float(size[~here].mean())
-    share = float(size[here].sum() / size.sum())
-    return inside > _MORE * outside and (share > _SHARE or (inside > 4 * outside and share > 0.05))
+    fraction = float(size[here].sum() / size.sum())
+    return inside > _MORE * outside and (fraction > _FRACTION or (inside > 4 * outside and fraction > 0.05))
 
 
 def _angles(reference: ReferenceScene) -> list[tuple[str, Array]]:

@@ -33,7 +33,7 @@ _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
 # fault may hide in it; where a hypothesis was found, a filter of pixels may have joined neighbours.
 _NOISE, _NOISE_ALONE = 0.25, 0.1
 _EVEN = 2.0  # mean over median of errors that are noise; 1.2 of a normal distribution
-_WORST = 0.02  # share of the pixels that may be as wrong as they like
+_WORST = 0.02  # fraction of the pixels that may be as wrong as they like
 _KNOWN = {"centre": 3e-4, "area": 3e-3}  # relative error of the fog model itself, in most pixels
 
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 GAIN = 10.0  #: how many times smaller the error must become for a suspect to be named
 LEAST = 0.01  #: relative error below which nothing is suspected
-OUTLIERS = 0.01  #: share of the lit values that may be as wrong as they like
+OUTLIERS = 0.01  #: fraction of the lit values that may be as wrong as they like
 
 _LARGEST = 700.0  # the logarithm of a number that a float can hold
 

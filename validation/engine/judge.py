@@ -391,7 +391,7 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
 
 
 def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:
-    """Return the relative error of the means of lit blocks, and the share of it that noise explains."""
+    """Return the relative error of the means of lit blocks, and the fraction of it that noise explains."""
     finite = np.isfinite(reference) & np.isfinite(image)
     wanted, got = np.where(finite, reference, 0.0), np.where(finite, image, 0.0)
     difference = got - wanted

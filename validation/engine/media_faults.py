@@ -250,7 +250,7 @@ MEDIUM = (
         Fault(
             name,
             f"the way {words} is not attenuated",
-            with_law(**{name.replace("path", "leg").replace("-", "_"): (0.0, 0.0)}),
+            with_law(**{name.replace("path", "segment").replace("-", "_"): (0.0, 0.0)}),
         )
         for name, words in (("light-path", "from the light"), ("camera-path", "to the camera"))
     ),
@@ -258,11 +258,14 @@ MEDIUM = (
         Fault(
             f"{of}-path",
             f"the way {words} is not attenuated for {which}",
-            with_law(**{f"{of}_leg": legs}),
+            with_law(**{f"{of}_leg": segments}),
             needs=("both",),
         )
         for of, words in (("light", "from the light"), ("camera", "to the camera"))
-        for which, legs in (("the fog, for surfaces it is", (0.0, 1.0)), ("surfaces, for the fog it is", (1.0, 0.0)))
+        for which, segments in (
+            ("the fog, for surfaces it is", (0.0, 1.0)),
+            ("surfaces, for the fog it is", (1.0, 0.0)),
+        )
     ),
     Fault(
         "unit-length",

@@ -10,5 +10,5 @@ Read in this order:
 - `merge.py`: references of several machines as one;
 - `agreement.py`: Monte Carlo estimators against the quadrature image;
 - `transmittance.py`: estimators of the transmittance of a ray, against the exact one;
-- `multiple_scattering.py`: the share of light that single scattering leaves out.
+- `multiple_scattering.py`: the fraction of light that single scattering leaves out.
 """

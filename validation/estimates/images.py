@@ -198,12 +198,12 @@ class _Watch:
         if self._progress is None:
             return
         if self._budget.seconds is not None:
-            share = (now - self._start) / self._budget.seconds
+            fraction = (now - self._start) / self._budget.seconds
         elif self._budget.samples is not None:
-            share = done / total
+            fraction = done / total
         else:
-            share = done / max(self._expected, done + 1) if self._expected else 0.0
-        self._progress(min(1.0, share), f"{estimator}, {done} batches{self._words}")
+            fraction = done / max(self._expected, done + 1) if self._expected else 0.0
+        self._progress(min(1.0, fraction), f"{estimator}, {done} batches{self._words}")
 
 
 def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, distance: NDArray[np.float64]) -> Image:

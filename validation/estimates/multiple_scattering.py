@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much multiple scattering a scene has: the share of light that every single-scattering method leaves out.
+"""How much multiple scattering a scene has: the fraction of light that every single-scattering method leaves out.
 
 volpath is run twice with the same seeds, with max_depth = 2 (one scattering) and with a large one. Over the batches b,
-with S_b and T_b the image means of the two, the share is
+with S_b and T_b the image means of the two, the fraction is
 
     1 - R,    R = mean(S) / mean(T),    s_R = std(S_b - R T_b) / (sqrt(K) mean(T))
 
 (the estimate of a ratio, and its standard error to first order; Cochran 1977, eq. 2.46). Paths of one seed begin alike,
-so that S and T rise and fall together: the smaller the share, the more of the noise cancels in S - R T. The ratio is
+so that S and T rise and fall together: the smaller the fraction, the more of the noise cancels in S - R T. The ratio is
 biased by about s_R^2, which is far below its interval. The interval is Student's, for K - 1 degrees of freedom.
 """
 

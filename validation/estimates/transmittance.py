@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Estimators of the transmittance T = exp(-tau) of a ray, and how wrong they are in a density grid.
 
-All look the extinction up at random places of a ray of the length l; a march of n steps does so at one random share of
-every step, which gives the unbiased estimate X = (l/n) sum sigma_t of tau.
+All look the extinction up at random places of a ray of the length l; a march of n steps does so at one random fraction
+of every step, which gives the unbiased estimate X = (l/n) sum sigma_t of tau.
 
 - **naive**: exp(-X). The exponential is convex, so by Jensen's inequality it is too bright: to second order by T v/2,
   with the variance v of X, which falls as 1/n^2 where the extinction is smooth.
@@ -32,7 +32,7 @@ from reference.scene.read import ReferenceScene
 from validation.columns import column
 
 Array = NDArray[np.float64]
-Look = Callable[[Array], Array]  # shares of a ray, any shape -> optical depth of the whole ray if all were as there
+Look = Callable[[Array], Array]  # fractions of a ray, any shape -> optical depth of the whole ray if all were as there
 
 _ORDER_0, _SURE, _RATE = 0.9, 2, 2.0  # of the roulette
 _RAYS, _TIMES = 48, 1024
@@ -52,7 +52,7 @@ class TransmittanceError:
 
 
 def marches(look: Look, random: np.random.Generator, times: int, steps: int) -> Array:
-    """Return estimates of an optical depth, (times,), by marches that look up one share of all steps."""
+    """Return estimates of an optical depth, (times,), by marches that look up one fraction of all steps."""
     return look((np.arange(steps) + random.random((times, 1))) / steps).mean(axis=1)
 
 
@@ -133,9 +133,9 @@ def transmittance_errors(
         if progress is not None:
             progress(ray / _RAYS, "rays")
 
-        def look(share: Array, ray: int = ray) -> Array:
-            places = begin[ray] + share[..., None] * (end - begin)[ray]
-            return length[ray] * medium.extinction(places.reshape(-1, 3)).reshape(share.shape)
+        def look(fraction: Array, ray: int = ray) -> Array:
+            places = begin[ray] + fraction[..., None] * (end - begin)[ray]
+            return length[ray] * medium.extinction(places.reshape(-1, 3)).reshape(fraction.shape)
 
         for count in steps:
             one = marches(look, random, _TIMES, count)

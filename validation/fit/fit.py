@@ -79,7 +79,7 @@ class Fit:
     parameters: tuple[Fitted, ...]
     groups: tuple[tuple[str, tuple[int, ...]], ...]  #: by name for JSON, which of `parameters` are its channels
     residual: float  #: relative rmse that is left, over the pixels that took part
-    explained: float  #: share of the image's variance
+    explained: float  #: fraction of the image's variance
     pixels: int  #: that were looked at
     left_out: int  #: of these, how many disagree with what explains the others
     noise: float  #: median of the relative residual, as a standard deviation
@@ -184,7 +184,7 @@ def fit_image(
 
 
 def _stage(progress: Progress, number: int, count: int) -> Progress:
-    return lambda share, what: progress((number + share) / count, what)
+    return lambda fraction, what: progress((number + fraction) / count, what)
 
 
 def _solved(

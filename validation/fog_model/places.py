@@ -136,8 +136,8 @@ def point_nodes(
     along = profile_of(light, rays)
     profile = 1.0 if along is None else along(x[:, None], ray)[:, 0]
     towards = sine[:, None] * direction + (1 / np.cosh(w))[:, None] * normal
-    camera, leg = lengths(reference, reference.origin, direction, x), lengths(reference, light.position, towards, r)
-    return Places(ray, x, r, towards, camera, leg, medium[owner], -sine, (weight * r * profile)[:, None])
+    camera, segment = lengths(reference, reference.origin, direction, x), lengths(reference, light.position, towards, r)
+    return Places(ray, x, r, towards, camera, segment, medium[owner], -sine, (weight * r * profile)[:, None])
 
 
 def parallel_nodes(
@@ -160,10 +160,10 @@ def parallel_nodes(
     place, weight, ray = place / depth[owner], weight / depth[owner], pieces.ray[owner]
     x, direction = pieces.x0[owner] + width[owner] * place, reference.direction[ray]
     point, unbounded = reference.origin + x[:, None] * direction, np.full(len(x), np.inf)
-    leg = lengths(reference, point, np.broadcast_to(-light.direction, point.shape), unbounded)
+    segment = lengths(reference, point, np.broadcast_to(-light.direction, point.shape), unbounded)
     camera, medium = lengths(reference, reference.origin, direction, x), pieces.medium[owner] + 1
     value = (weight * width[owner])[:, None]
-    return Places(ray, x, np.ones_like(x), 0 * direction, camera, leg, medium, rays.foot[ray], value)
+    return Places(ray, x, np.ones_like(x), 0 * direction, camera, segment, medium, rays.foot[ray], value)
 
 
 def surface_points(
@@ -180,15 +180,15 @@ def surface_points(
     if isinstance(light, DirectionalLight):
         r, towards, value = np.ones(len(ray)), np.zeros_like(point), reflected[ray]
         way = np.broadcast_to(-light.direction, point.shape)
-        leg = lengths(reference, point, way, np.full(len(ray), np.inf))
+        segment = lengths(reference, point, way, np.full(len(ray), np.inf))
     else:
         way = point - light.position
         r = np.maximum(np.linalg.norm(way, axis=1), np.finfo(float).tiny)
         towards = way / r[:, None]
-        leg = lengths(reference, light.position, towards, r)
+        segment = lengths(reference, light.position, towards, r)
         value = reflected[ray] * (_profile(light, towards) / r**2)[:, None]
     camera, none = lengths(reference, reference.origin, direction, x), np.empty(0)
-    return Places(ray, x, r, towards, camera, leg, none.astype(np.int64), none, value)
+    return Places(ray, x, r, towards, camera, segment, none.astype(np.int64), none, value)
 
 
 def panel_nodes(

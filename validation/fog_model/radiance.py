@@ -51,8 +51,8 @@ class Fog:
     exposure: Colour = (1.0, 1.0, 1.0)  #: factor on the image [1]
     #: Fractions of the extinction that attenuate the way to the camera, and the way from the light: of what the medium
     #: scatters, and of what surfaces reflect [1].
-    camera_leg: tuple[float, float] = (1.0, 1.0)
-    light_leg: tuple[float, float] = (1.0, 1.0)
+    camera_segment: tuple[float, float] = (1.0, 1.0)
+    light_segment: tuple[float, float] = (1.0, 1.0)
     near: float = 0.0  #: the medium without bounds is missing before this plane, along the camera's axis [m]
     far: float = np.inf  #: it ends at this plane, or at this distance [m]
     spherical: bool = False  #: whether `near` and `far` are distances from the camera, not planes
@@ -185,7 +185,7 @@ class FogModel:
             camera, light, log_density = self._by_height(places, fog, number, camera, light, away)
         total, sigma_t, count = np.zeros((len(view.pixels), 3)), np.array(fog.sigma_t), len(view.pixels)
         for channels in _alike(fog):
-            depth = (fog.camera_leg[layer] * camera + fog.light_leg[layer] * light) @ sigma_t[:, channels[0]]
+            depth = (fog.camera_segment[layer] * camera + fog.light_segment[layer] * light) @ sigma_t[:, channels[0]]
             left = strength * np.exp(np.nan_to_num(log_density - depth, nan=-np.inf, neginf=-np.inf))
             if places.is_surface:
                 for channel in channels:

@@ -7,7 +7,7 @@ with the few digits that are left. In either case a product is wrong by at most 
 that happens is a matter of units and factors, so that a value far above t can hang on it: a light 2e5 m away, 60
 optical depths, J = 1.2e-33 1/m over 3e4 m is a sum of terms of 1e-38 1/m^2 each.
 
-A rule with n nodes adds up terms w_k f_k, the shares w_k adding up to 1, over a length L:
+A rule with n nodes adds up terms w_k f_k, the fractions w_k adding up to 1, over a length L:
 
     J = int f dx ~ L sum_k w_k f_k,        f = exp(-sigma_t (x + r)) p / r^2   [1/m^2].
 

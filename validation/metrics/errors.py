@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from analytic.errors import InputError
 from validation.columns import column
 
-FLOOR = 1e-3  #: the least denominator of a relative error, as a share of the mean of the reference
+FLOOR = 1e-3  #: the least denominator of a relative error, as a fraction of the mean of the reference
 RADIANCE = "W/(m^2 sr)"
 _RELATIVE = "|error| over the reference, or over a thousandth of its mean where that is more"
 

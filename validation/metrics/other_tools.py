@@ -49,7 +49,7 @@ Array = NDArray[np.float64]
 
 EPSILON = 0.01  #: added to denominators by tev, pbrt, SimpleImageIO and JERI [units of radiance]
 EPSILON_JERI_SQUARED = 1e-4  #: JERI's under squares, 0.01 squared
-TRIMMED = 0.001  #: share of the largest values that `relmse_trim` leaves out
+TRIMMED = 0.001  #: fraction of the largest values that `relmse_trim` leaves out
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,7 @@ class MotionComparison:
             + (
                 ""
                 if found.trail_rmse is None
-                else f"; its trail, {_percent(found.trail_share)} of the values, is {_percent(found.trail_rmse)} off"
+                else f"; its trail, {_percent(found.trail_fraction)} of the values, is {_percent(found.trail_rmse)} off"
             ),
         ]
         if found.pop is not None:

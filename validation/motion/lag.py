@@ -11,7 +11,7 @@ a frame on the one before is wrong where noise comes after the history. Offset a
 bias looks like a lag.
 
 **Which lag there is, if any.** The impulse response is the best t_n = c m + sum of h_k r_(n-k), k from 0 to 15, h >= 0.
-What a lag describes of it is the share of what both leave less than no filter at all.
+What a lag describes of it is the fraction of what both leave less than no filter at all.
 
 Squares count with 1/(r + 0.1 m)^2, r the mean of a value in time: otherwise a few bright pixels rule. Filters in time
 commute with means over pixels, so means over cells of 4 x 4 pixels are fitted.
@@ -58,7 +58,7 @@ class Lag:
     gain: Estimate = UNKNOWN
     persistence: Estimate = UNKNOWN
     delay: Estimate = UNKNOWN  #: [frames]
-    described: float | None = None  #: share of what an impulse response explains; None where the lag may be zero
+    described: float | None = None  #: fraction of what an impulse response explains; None where the lag may be zero
     response: tuple[Estimate, ...] = ()  #: of a flash, by frame after it
 
     @property
@@ -209,7 +209,7 @@ def _jackknife(sums: Array, persistence: float) -> tuple[Estimate, Estimate, Est
 
 
 def _impulse_response(cells: Cells, left: float) -> tuple[tuple[Estimate, ...], float | None]:
-    """Return the response to a flash, and which share of what it explains a filter does that leaves a sum of squares.
+    """Return the response to a flash, and the fraction that a filter with a given sum of squares explains of it.
 
     Light from before a history began counts as that of its first frame, and what is older than all taps as the last.
     """

@@ -8,8 +8,8 @@ With r_n the reference of frame n, t_n the frame, e = t - r, and m the mean of r
   autocorrelation of 3 over the root of their number on they are not, and several runs of the sequence are needed;
 - flicker: the root mean square of e_n - e_(n-1), over m: the change of the reference is out of it. Beside the lag: the
   same of t - c m - g y, what no lag explains (`validation.motion.lag`);
-- ghost: light that left a place in the last twelve frames is w = max(r_(n-12) .. r_n) - r_n; the share G of it that is
-  still there is a coefficient of e = c m + b r + G w. By age k, w is max(r_(n-k) - r_n, 0);
+- ghost: light that left a place in the last twelve frames is w = max(r_(n-12) .. r_n) - r_n; the fraction G of it that
+  is still there is a coefficient of e = c m + b r + G w. By age k, w is max(r_(n-k) - r_n, 0);
 - trail: the error where w is above 0.05 m;
 - pop: the largest root mean square of e_n - e_(n-1) of a frame, over the median of all frames;
 - convergence at rest: after how many frames of a history, while the reference does not change, the error is within 5 %
@@ -85,7 +85,7 @@ class Measures:
     ghost_by_age: tuple[Estimate, ...]  #: from one frame on
     trail_rmse: float | None
     trail_bias: float | None
-    trail_share: float  #: of the values
+    trail_fraction: float  #: of the values
     pop: float | None  #: ratio to the median
     pop_frame: int | None
     convergence: int | None  #: frames after a reset; None where the reference moves
@@ -144,7 +144,7 @@ class _FirstPass:
     def __init__(self, shape: tuple[int, ...], frames: int) -> None:
         rows, columns = (-(-side // CELL) for side in shape)
         self.reference, self.test = np.zeros((2, frames, rows, columns, 3))
-        self.share = np.zeros((frames, rows, columns, 1))
+        self.fraction = np.zeros((frames, rows, columns, 1))
         self.sums: Array = np.zeros(())
         self.brightness = np.zeros((*shape, 3))
         self.frame_sums: list[Array] = []
@@ -157,7 +157,7 @@ class _FirstPass:
         return float(total[0, 2] / total[0, 0]) if total[0, 0] > 0 else 0.0
 
     def cells(self, sequence: Sequence) -> Cells:
-        weight = self.share / (self.reference.mean(axis=0) + DARK * self.mean) ** 2
+        weight = self.fraction / (self.reference.mean(axis=0) + DARK * self.mean) ** 2
         return Cells(self.reference, self.test, weight, self.mean, sequence.start)
 
 
@@ -179,7 +179,7 @@ def _first_pass(sequence: Sequence) -> _FirstPass:
         found.reference[n], found.test[n] = _cell_means(reference), _cell_means(frame)
         if not sequence.counts(n):
             continue
-        found.share[n] = _cell_means(selected.astype(np.float64)).mean(axis=2, keepdims=True)
+        found.fraction[n] = _cell_means(selected.astype(np.float64)).mean(axis=2, keepdims=True)
         pair = np.where(selected, float(sequence.pair_counts(n)), 0.0)
         change = (error - before) * pair if n else np.zeros_like(error)
         moved = (reference - last) * pair if n else np.zeros_like(error)
@@ -254,7 +254,7 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         ),
         trail_rmse=math.sqrt(trail[2] / trail[0]) / mean if trail[0] else None,
         trail_bias=trail[1] / trail[0] / mean if trail[0] else None,
-        trail_share=float(trail[0] / total[0, 0]),
+        trail_fraction=float(trail[0] / total[0, 0]),
         pop=float(jumps.max() / median) if median > 0 else None,
         pop_frame=counted[places[int(np.argmax(jumps))]] if median > 0 else None,
         convergence=_convergence(

@@ -15,14 +15,15 @@ Errors of V and b^2 come from leaving out one run at a time. N runs averaged hav
 **Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that few runs have none:
 their mean is too dark, and so is their spread too small. Of a sum of independent deviations x with skewness g = sum of
 x^3 over (sum of x^2)^(3/2), an interval of 95 % lies below the mean in 2.5 % + 0.084 g of all cases, by the first term
-of Edgeworth's series. |g| is at most the root of the largest share of a value in the sum of squares. From a share of
-1 % on, where g may be 0.1 (where channels agree, 0.17), no bias against the largest deviation is told, and no want of
-one. A bias towards it is: there the interval is too wide. Where the variance exists the share falls with the runs.
+of Edgeworth's series. |g| is at most the root of the largest fraction of a value in the sum of squares. From a fraction
+of 1 % on, where g may be 0.1 (where channels agree, 0.17), no bias against the largest deviation is told, and no want
+of one. A bias towards it is: there the interval is too wide. Where the variance exists the fraction falls with the
+runs.
 
 **Noise between pixels.** With n_i = (e_i - mean of e) sqrt(N/(N - 1)) the error spectrum is the periodogram of n_i over
 its mean square, in rings of the frequency: white noise is 1 everywhere, however unequal the pixels are (Celarek, Jakob,
-Wimmer and Lehtinen 2019). The low share is its mean below 1/8 cycle a pixel: below 0.3 the noise is blue, above 1.5 it
-is filtered. The blur gain is the root mean square of n after a Gaussian of deviation s over that before, times
+Wimmer and Lehtinen 2019). The low fraction is its mean below 1/8 cycle a pixel: below 0.3 the noise is blue, above 1.5
+it is filtered. The blur gain is the root mean square of n after a Gaussian of deviation s over that before, times
 2 sqrt(pi) s: 1 for white noise.
 """
 
@@ -72,9 +73,9 @@ class Noise:
     variance: Estimate = _NO_NOISE
     relative_rmse: float  #: of one run, root of the mean over runs
     largest_deviation: float = 0.0  #: of a single value from its mean over the runs
-    largest_share: float = 0.0  #: of that in the sum of squared deviations
+    largest_fraction: float = 0.0  #: of that in the sum of squared deviations
     spectrum: tuple[float, ...] = ()  #: by ring
-    low_share: float = math.nan
+    low_fraction: float = math.nan
     blurred_rmse: tuple[float, ...]  #: after each of `BLURS`
     blur_gain: tuple[float, ...] = ()
     seconds: float | None = None  #: of a run [s]
@@ -91,10 +92,13 @@ class Noise:
         low, high = (100 * end for end in self.bias_ci)
         if self.runs == 1:
             return f"no random numbers: all of its error is bias, {low:+.3g} % in the mean"
-        if self.largest_share > _DOUBTFUL and not min(low * self.largest_deviation, high * self.largest_deviation) > 0:
+        if (
+            self.largest_fraction > _DOUBTFUL
+            and not min(low * self.largest_deviation, high * self.largest_deviation) > 0
+        ):
             kind = "brighter" if self.largest_deviation > 0 else "darker"
             return (
-                f"whether there is a bias cannot be told: one value has {100 * self.largest_share:.2g} % of the "
+                f"whether there is a bias cannot be told: one value has {100 * self.largest_fraction:.2g} % of the "
                 f"variance of {self.runs} runs, so still {kind} ones may be missing; wanted more runs"
             )
         if low <= 0 <= high and self.root_bias is None:
@@ -171,9 +175,9 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
         variance=variance,
         relative_rmse=math.sqrt(float(np.mean(errors**2))),
         largest_deviation=largest,
-        largest_share=largest**2 / (square * noise.size),
+        largest_fraction=largest**2 / (square * noise.size),
         spectrum=spectrum,
-        low_share=low,
+        low_fraction=low,
         blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
         blur_gain=tuple(gains),
         seconds=seconds,
@@ -281,7 +285,7 @@ class NoiseComparison:
             + ", ".join(f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)),
             "error spectrum   "
             + " ".join(f"{each:.3g}" for each in noise.spectrum)
-            + f"; at low frequencies {noise.low_share:.3g}",
+            + f"; at low frequencies {noise.low_fraction:.3g}",
             "blurred          "
             + ", ".join(
                 f"{blur:g} px: {100 * error:.3g} % (gain {gain:.3g})"

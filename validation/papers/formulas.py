@@ -135,9 +135,9 @@ def _droplets() -> dict[str, float]:
     green = optics()
     return {
         "g": green.g,
-        "forward": 100 * green.share(0, 90),
-        "peak": 100 * green.share(0, 5),
-        "lobe": 100 * green.share(5, 90),
+        "forward": 100 * green.fraction(0, 90),
+        "peak": 100 * green.fraction(0, 5),
+        "lobe": 100 * green.fraction(5, 90),
         "cut": 100 * float(Modified(green).removed),
         "path": green.mean_free_path,
         "eq. 4": green.printed_extinction / green.extinction,

@@ -30,8 +30,8 @@ PROPERTIES: Mapping[str, str] = {
     "bounded": "number of bounded media",
     "optical_depth": "optical depth",
     "mean_cosine": "mean cosine of scattering",
-    "surface_share": "fraction of pixels with surfaces",
-    "lit_share": "fraction of lit points",
+    "surface_fraction": "fraction of pixels with surfaces",
+    "lit_fraction": "fraction of lit points",
     "triangles": "number of triangles",
     "pixels": "pixels",
 }
@@ -40,8 +40,8 @@ PROPERTIES: Mapping[str, str] = {
 def scene_properties(scene: Scene) -> dict[str, float]:
     """Return the properties of a scene by name, as `realtime.scene.read_scene.read_scene` returned it."""
     lights, (origin, ends, depth) = light_places(scene), _seen(scene)
-    share = (np.arange(_STEPS) + 0.5) / _STEPS
-    points = origin + share[:, None] * (ends - origin)[..., None, :]
+    fraction = (np.arange(_STEPS) + 0.5) / _STEPS
+    points = origin + fraction[:, None] * (ends - origin)[..., None, :]
     kinds = [light.kind for light in lights]
     lamps = {light.name for light in scene.area_lights}
     balls = [(*_ball(each), _extinction(each.medium)) for each in scene.medium.bounded_media]
@@ -52,8 +52,8 @@ def scene_properties(scene: Scene) -> dict[str, float]:
         "bounded": len(scene.medium.bounded_media),
         "optical_depth": optical_depths(balls, _extinction(scene.medium), origin, ends).mean(),
         "mean_cosine": _mean_cosine(scene),
-        "surface_share": np.isfinite(depth).mean(),
-        "lit_share": np.mean([lit_points(scene.geometry, light, points) for light in lights]),
+        "surface_fraction": np.isfinite(depth).mean(),
+        "lit_fraction": np.mean([lit_points(scene.geometry, light, points) for light in lights]),
         "triangles": sum(shape.face_count() for shape in meshes),
         "pixels": scene.camera.width * scene.camera.height,
     }

@@ -118,27 +118,27 @@ def _objects(scene: Scene, animation: Animation) -> Objects | None:
     return read_objects(scene, names)
 
 
-def _turn(scene: Scene, share: float) -> Array:
-    """Return the rotation about the vertical by a share of a turn, (3, 3)."""
-    return rotation(vertical(scene).tolist(), 360 * share) if share else np.eye(3)
+def _turn(scene: Scene, fraction: float) -> Array:
+    """Return the rotation about the vertical by a fraction of a turn, (3, 3)."""
+    return rotation(vertical(scene).tolist(), 360 * fraction) if fraction else np.eye(3)
 
 
 def _step(scene: Scene, animation: Animation) -> Callable[[float], Scene]:
-    """Return a function from a share of the turn, 0 to 1, to the scene after it."""
+    """Return a function from a fraction of the turn, 0 to 1, to the scene after it."""
     about = np.array(animation.about) if animation.about else middle(scene)
     objects = _objects(scene, animation)
 
-    def after(share: float) -> Scene:
-        turn = _turn(scene, share)
+    def after(fraction: float) -> Scene:
+        turn = _turn(scene, fraction)
         lights, area_lights, medium = scene.lights, scene.area_lights, scene.medium
         if "light" in animation.moves:
             lights = tuple(turned_light(light, about, turn) for light in lights)
             area_lights = tuple(turned_area_light(light, about, turn) for light in area_lights)
         if "colour" in animation.moves:
-            lights = tuple(coloured_light(light, share) for light in lights)
-            area_lights = tuple(coloured_area_light(light, share) for light in area_lights)
+            lights = tuple(coloured_light(light, fraction) for light in lights)
+            area_lights = tuple(coloured_area_light(light, fraction) for light in area_lights)
         if "medium" in animation.moves:
-            medium = thicker_medium(medium, 1 + 0.5 * np.sin(2 * np.pi * share))
+            medium = thicker_medium(medium, 1 + 0.5 * np.sin(2 * np.pi * fraction))
         moved = replace(scene, lights=lights, medium=medium)
         moved = turned_objects(moved, objects, turn) if objects else moved
         return with_area_lights(moved, area_lights)

@@ -96,8 +96,8 @@ def _distance_to_hull(bounds: Bounds, point: Array) -> float:
     weight = 1e4 * bounds.radius
     corners = np.unique(bounds.corners.reshape(-1, 3), axis=0) - point
     matrix = np.vstack([corners.T, np.full(len(corners), weight)])
-    shares, _ = nnls(matrix, np.array([0.0, 0.0, 0.0, weight]))
-    return float(np.linalg.norm(shares @ corners / shares.sum()))
+    fractions, _ = nnls(matrix, np.array([0.0, 0.0, 0.0, weight]))
+    return float(np.linalg.norm(fractions @ corners / fractions.sum()))
 
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
@@ -235,6 +235,6 @@ def _piercing(corners: Array, begin: Array, end: Array):
         u = np.einsum("ij,ij->i", offset, across) * inverse
         turned = np.cross(offset, first)
         v = np.einsum("ij,ij->i", along, turned) * inverse
-        share = np.einsum("ij,ij->i", second, turned) * inverse
-        weights = np.stack([u, v, 1 - u - v, share, 1 - share])
+        fraction = np.einsum("ij,ij->i", second, turned) * inverse
+        weights = np.stack([u, v, 1 - u - v, fraction, 1 - fraction])
         return np.all(weights > _SIDE, axis=0) & np.isfinite(inverse)

@@ -26,19 +26,19 @@ def _cumulus_distance(points: Array) -> Array:
     """Return about the signed distance [m] from the cumulus, at points, (n, 3) [m]."""
     count = 31
     number = np.arange(count)
-    share = np.sqrt((number + 0.37) / count)
+    fraction = np.sqrt((number + 0.37) / count)
     angle = 2.39996 * number + 0.71
     rank = (0.618034 * number + 0.29) % 1.0
-    tower = 1 - share**2.3
+    tower = 1 - fraction**2.3
     centres = np.stack(
         [
-            31.0 + 527.0 * share * np.cos(angle),
-            -7.0 + 391.0 * share * np.sin(angle),
+            31.0 + 527.0 * fraction * np.cos(angle),
+            -7.0 + 391.0 * fraction * np.sin(angle),
             _BASE + 53.0 + (83.0 + 337.0 * rank) * tower,
         ],
         axis=1,
     )
-    radii = 89.0 + 83.0 * (1 - share) + 47.0 * ((0.754878 * number + 0.13) % 1.0)
+    radii = 89.0 + 83.0 * (1 - fraction) + 47.0 * ((0.754878 * number + 0.13) % 1.0)
     union = lobes(centres, radii, 13.7)(points) + 11.3 - 39.0 * bumps(points, 47.0)
     base = _BASE + 9.7 * np.sin(points[:, 0] / 131.0 + 0.9) * np.sin(points[:, 1] / 113.0) - points[:, 2]
     return np.maximum(union, base)
@@ -79,8 +79,8 @@ def star_shaped(function: Callable[[Array], Array], centre: Array, reach: float,
     for number in range(_STEPS - 1, -1, -1):
         value = function(centre + number * step * directions)
         enters = outside & (value < 0)
-        share = value[enters] / (value[enters] - previous[enters])
-        radius[enters] = (number + share) * step
+        fraction = value[enters] / (value[enters] - previous[enters])
+        radius[enters] = (number + fraction) * step
         outside &= ~enters
         previous = value
     return centre + radius[:, None] * directions, faces

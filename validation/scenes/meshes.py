@@ -208,8 +208,8 @@ def pierced(
     """Return an open wall with a round hole: 2 cells[0] cells[1] triangles, cells[0] of which touch the hole.
 
     A `corner` of the rectangle and the two edges that start there, (3,) each [m], have the normal across x up. The hole
-    has the position of its centre along `across` and along `up`, as shares of them, and a radius [m]. Cells are counted
-    around the hole, even and at least 8, and from the hole to the border.
+    has the position of its centre along `across` and along `up`, as fractions of them, and a radius [m]. Cells are
+    counted around the hole, even and at least 8, and from the hole to the border.
     """
     u, v, radius = hole
     right, above = np.asarray(across, dtype=np.float64), np.asarray(up, dtype=np.float64)
@@ -222,8 +222,8 @@ def pierced(
     border = np.minimum(sideways, upwards)[:, None] * np.stack([x, y], axis=1)
     for end in np.array([[-u, -v], [1 - u, -v], [1 - u, 1 - v], [-u, 1 - v]]) * (width, height):
         border[np.argmax((x * end[0] + y * end[1]) / np.linalg.norm(end))] = end
-    share = np.arange(cells[1] + 1)[:, None, None] / cells[1]
-    offset = (1 - share) * radius * np.stack([x, y], axis=1) + share * border
+    fraction = np.arange(cells[1] + 1)[:, None, None] / cells[1]
+    offset = (1 - fraction) * radius * np.stack([x, y], axis=1) + fraction * border
     points = np.asarray(corner) + (u + offset[..., :1] / width) * right + (v + offset[..., 1:] / height) * above
     i, n = np.arange(cells[0]), cells[0]
     j = (i + 1) % n
@@ -271,7 +271,7 @@ def pierced_slab(along: NDArray, up: NDArray, thickness: float, corner: Sequence
 
 
 def profile(stops: Sequence[float], radii: Sequence[float], *, height: float, rings: int, sides: int) -> Mesh:
-    """Return the lathe of a profile that is linear between stops (shares of the height) with radii [m]."""
+    """Return the lathe of a profile that is linear between stops (fractions of the height) with radii [m]."""
     level = np.linspace(0.0, 1.0, rings)
     return lathe(np.interp(level, stops, radii), height * level, sides)
 

@@ -106,4 +106,4 @@ def _check_faces(name: str, parameters: Any) -> None:
     faces = np.array(parameters["faces"], dtype=np.int64)
     count = len(np.array(parameters["vertex_positions"])) // 3
     if faces.size and faces.max() >= count:
-        raise InputError(f"{name}: a face has vertex {faces.max()} of {count}, counted from 0; mend the mesh")
+        raise InputError(f"{name}: a face has vertex {faces.max()} of {count}, counted from 0; repair the mesh")

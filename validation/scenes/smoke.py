@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Smoke as a density grid: a plume that rises, widens, wanders and tears, from gradient noise.
 
-At the share s of its height the plume has the radius r(s) and the middle m(s), which drifts as smoke does in a room:
+At the fraction s of its height the plume has the radius r(s) and the middle m(s), which drifts as smoke does in a room:
 
     rho = max(0, exp(-(d/r)^2) + tear n(p) - cut)/(1 + tear - cut),     d = |p - m(s)|,
 

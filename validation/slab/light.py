@@ -130,7 +130,7 @@ def slab_numbers(
     request: SlabRequest, *, photons: int = 0, seed: int = 0, progress: Progress | None = None
 ) -> SlabNumbers:
     """Return all numbers of a slab."""
-    tell = progress or (lambda share, what: None)
+    tell = progress or (lambda fraction, what: None)
     tell(0.0, "orders")
     streams = needed_streams(request.phase.deterministic)
     numbers, others = _numbers(request, streams, _NODES), _numbers(request, 3 * streams // 4, _NODES - 2)

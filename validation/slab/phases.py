@@ -162,7 +162,7 @@ def droplet_phase(radius: float, gamma: float, wavelength: float, *, modified: b
     """Return the phase function of droplets; the numbers are those of `realtime.droplets.droplet_series`.
 
     If it is `modified`, the peak below `CUT` is cut to zero: lengths are then those of the medium whose density is
-    lowered by the share of the peak.
+    lowered by the fraction of the peak.
     """
     series, edge = droplet_series(radius, gamma, wavelength), np.deg2rad(CUT)
     if not modified:
@@ -176,7 +176,7 @@ def hg_draine_phase(diameter: float) -> AnglePhase:
     Its narrow lobe is a few thousandths wide: panels near the peak are as short as their distance from it.
     """
     fit = HgDraine(diameter)
-    (share, narrow), (_, wide) = fit.lobes
+    (fraction, narrow), (_, wide) = fit.lobes
     constant, square = fit.rise
     breaks = np.append(0.0, np.geomspace(1e-4, np.pi, 16))
     breaks[-1] = np.pi
@@ -184,6 +184,6 @@ def hg_draine_phase(diameter: float) -> AnglePhase:
     def heights(angles: Array) -> Array:
         down, cosines = np.sin(angles / 2) ** 2, np.cos(angles)
         lobes = [(1 - g * g) / ((1 - g) ** 2 + 4 * g * down) ** 1.5 for g in (narrow, wide)]
-        return share * lobes[0] + (constant + square * cosines**2) * lobes[1]
+        return fraction * lobes[0] + (constant + square * cosines**2) * lobes[1]
 
     return AnglePhase(heights, breaks)

@@ -6,7 +6,7 @@ The source at a direction of the user is summed over the modes of the azimuth,
     J(z, mu, phi) = sum_m (2 - delta_m0) cos(m phi) (albedo/2) sum_j w_j K_m(mu, mu_j) I_m(z, mu_j)
                   + (albedo/4 pi) P(cos Theta_0) exp(-z/mu_0),
 
-and carried to the depths. The peak that the streams cannot resolve is left in the beam (delta-M): with f its share,
+and carried to the depths. The peak that the streams cannot resolve is left in the beam (delta-M): with f its fraction,
 depths are (1 - albedo f) z and the albedo albedo (1 - f)/(1 - albedo f). The last term has the true phase function
 over 1 - albedo f (Nakajima and Tanaka 1988, their TMS). With more streams both corrections vanish; the error that
 `light.py` prints is the change from three quarters of the streams.
@@ -25,7 +25,7 @@ from realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[np.float64]
 
-#: A mode below this share of the source, twice in a row, ends the sum over modes.
+#: A mode below this fraction of the source, twice in a row, ends the sum over modes.
 _NEGLIGIBLE = 1e-10
 
 

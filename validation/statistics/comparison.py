@@ -41,9 +41,9 @@ v is the variance of a sum of fully dependent channels, the largest that there c
 share their paths, and the interval must not be too narrow for it. It is up to sqrt(channels) too wide if they do not.
 
 **Heavy tails.** The errors of pixels are independent but heavy tailed (P(X > x) ~ x^(-3/2) next to the light), and the
-sums are normal only if many pixels of similar weight add up. `largest_share`, the share of one pixel in var B, says how
-far that holds; the degrees of freedom of Satterthwaite, (sum v)^2 / sum(v^2 / (K - 1)), fall to K - 1 where one pixel
-rules.
+sums are normal only if many pixels of similar weight add up. `largest_fraction`, that of one pixel in var B, says
+how far that holds; the degrees of freedom of Satterthwaite, (sum v)^2 / sum(v^2 / (K - 1)), fall to K - 1 where one
+pixel rules.
 
 **Batches.** If the mean over the image is known for each of K batches, a second interval follows from the spread of
 these K numbers alone, with K - 1 degrees of freedom. Each of them is a mean over all pixels, much nearer to the normal
@@ -260,7 +260,7 @@ def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]
     """Pool the error of all pixels into one relative bias; nothing of it is known if the reference is not bright."""
     numbers = ("relative_bias", "relative_bias_se", "relative_bias_freedom", "relative_bias_p")
     found: dict[str, Any] = dict.fromkeys(numbers, np.nan)
-    found |= dict.fromkeys(("reference_variance_share", "largest_share", "detectable_bias"), np.nan)
+    found |= dict.fromkeys(("reference_variance_fraction", "largest_fraction", "detectable_bias"), np.nan)
     found |= {"relative_bias_ci": (np.nan, np.nan), "relative_bias_ci_batches": None}
     bright = float(reference.mean.sum())
     if not bright > 0:
@@ -284,8 +284,8 @@ def _relative_bias(reference: _Side, test: _Side, pixels: int) -> dict[str, Any]
     found["detectable_bias"] = max(reach, reach_batches)
     if total > 0:
         found["relative_bias_p"] = float(two_sided_p(np.asarray(value / error), np.asarray(freedom)))
-        found["reference_variance_share"] = of_reference / total
-        found["largest_share"] = float(variance.max()) / total
+        found["reference_variance_fraction"] = of_reference / total
+        found["largest_fraction"] = float(variance.max()) / total
     return found
 
 

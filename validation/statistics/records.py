@@ -40,8 +40,8 @@ class Statistics:
     relative_bias_se: Number  #: from the standard errors of the pixels
     relative_bias_freedom: Number  #: degrees of freedom of that; None for the normal law
     relative_bias_p: Number  #: two-sided
-    reference_variance_share: Number  #: of the reference in the variance of `relative_bias`; the rest is the test's
-    largest_share: Number  #: of one pixel in that variance; above 1 % the interval is doubtful
+    reference_variance_fraction: Number  #: of the reference in the variance of `relative_bias`; the rest is the test's
+    largest_fraction: Number  #: of one pixel in that variance; above 1 % the interval is doubtful
     detectable_bias: Number  #: smallest that is found with 90 % power at the 5 % level, by the wider interval
     margin: Number
     equivalent: bool | None  #: whether all intervals lie within the margin

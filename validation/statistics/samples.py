@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What samples say: p-values and what to do with many of them, intervals of a share, a quantile, a rank correlation.
+"""What samples say: p-values and what to do with many of them, intervals of a fraction, a quantile, a rank correlation.
 
 A sample of an interval is what was drawn independently of the others, such as a scene. What was measured in one scene,
 by pixels or by methods, is one sample however many numbers it has.
@@ -94,7 +94,7 @@ def binomial_interval(successes: int, trials: int, level: float = LEVEL) -> tupl
 def quantile_interval(values: ArrayLike, probability: float) -> tuple[float, float | None, float | None]:
     """Return a quantile of a sample and its interval, which is free of any law.
 
-    The quantile at p is the least value that at least the share p of the sample does not exceed. The ends of the
+    The quantile at p is the least value that at least the fraction p of the sample does not exceed. The ends of the
     interval are order statistics (David and Nagaraja 2003, *Order Statistics*, section 7.1); None where the sample,
     (n,) with n > 0, is too small for an end. Infinities are values.
     """

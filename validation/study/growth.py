@@ -30,12 +30,12 @@ thinner than a texel do not converge before the map resolves them.
 **Upright walls.** Where rays have found the jumps on the edges of texels
 (`realtime.methods.light_volumes.jump_search`) the edge of a shadow is known to epsilon = 1/64 of a texel, or to
 O(1/N^2) where it is a smooth outline between two sides. What is left of order 1 has a constant that is smaller by as
-much. Corners of outlines lie within a texel, which has the wrong shape there: a share of O(1/N) of the rays that cross
-the edge is wrong by O(1/N), a root mean square of O(N^(-3/2)). So the order lies between 1 and 3/2; occluders that are
-thinner than a texel and smooth ones that are met at a grazing angle take from it as above.
+much. Corners of outlines lie within a texel, which has the wrong shape there: a fraction of O(1/N) of the rays that
+cross the edge is wrong by O(1/N), a root mean square of O(N^(-3/2)). So the order lies between 1 and 3/2; occluders
+that are thinner than a texel and smooth ones that are met at a grazing angle take from it as above.
 
 **The order of the flicker.** An edge in the map stays where it is while the light moves by less than a texel, and then
-jumps by one. Let the light move by m texels a frame, m = N step / 2 at a step in radians. For m < 1 a share m of the
+jumps by one. Let the light move by m texels a frame, m = N step / 2 at a step in radians. For m < 1 a fraction m of the
 edges jumps in a frame, by O(1/N) each: their root mean square is sqrt(m) / N, and at a given step it falls as
 N^(-1/2). For m >= 1 the errors of consecutive frames have nothing to do with each other: the flicker is sqrt(2) times
 the error of a frame and falls as 1/N.

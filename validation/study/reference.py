@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 # point takes as long as a point light does, and surfaces take as long again: these are left out.
 _PLAN = PointPlan(error=2e-2, first=2, most=4, surfaces=False)
 
-_SHARE = 16  # one pixel in so many has a reference where lights have an extent
+_FRACTION = 16  # one pixel in so many has a reference where lights have an extent
 
 _LEAST = 64  # pixels that have one
 _SEED = 20261123  # of their choice
@@ -100,7 +100,7 @@ def sampled_reference(scene) -> dict[str, NDArray[Any]]:
     check_camera(reference)
     count = reference.height * reference.width
     mask = np.zeros(count, dtype=bool)
-    mask[np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _SHARE)]] = True
+    mask[np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _FRACTION)]] = True
     some = replace(reference, direction=reference.direction[mask])
     check_rays(some, surface_hits(some).distance)
     rays = ray_values(some, plan=_PLAN)

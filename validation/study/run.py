@@ -292,8 +292,8 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     small, large = prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen), renderer.scene.camera
     render_frame(small)
     took = 1e-3 * timed(lambda: render_frame(small)).ms
-    share = (large.width * large.height) / (PROBE[0] * PROBE[1])
-    expected = preparation + max(0.0, took - preparation) * share
+    fraction = (large.width * large.height) / (PROBE[0] * PROBE[1])
+    expected = preparation + max(0.0, took - preparation) * fraction
     if expected <= limit:
         return None
     return (

@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 Layer = NDArray[np.floating]  # frames are float32
 Progress = Callable[[float, str], None]
 
-_MULTIPLE = (64, 48)  # size of the image whose share of multiple scattering is measured [pixels]
+_MULTIPLE = (64, 48)  # size of the image whose fraction of multiple scattering is measured [pixels]
 _DEPTH = "depth"  # the distance among the arrays of a frame
 _COMPILED = 2.0  # that the kernels of a configuration or an estimator take [s], beside its work on one thread
 
@@ -250,7 +250,7 @@ def check_reference(scene, checks: Checks, *, spread: ElsewhereFor | None = None
 
 @kept("scene-multiple")
 def multiple_scattering(scene, batches: int, samples: int) -> MultipleScattering:
-    """Return the share of multiple scattering; see `validation.estimates.multiple_scattering`."""
+    """Return the fraction of multiple scattering; see `validation.estimates.multiple_scattering`."""
     return multiple_scattering_fraction(scene, batches=batches, samples=samples)
 
 

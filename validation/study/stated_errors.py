@@ -149,11 +149,11 @@ def _equal_steps(reference: ReferenceScene, light: DirectionalLight, distance: A
 
 def _from_place(reference: ReferenceScene, light: ReferenceLight, point: Array) -> tuple[Array, Array]:
     """Return the direction in which light arrives at points, and how much of it [W/m^2], (n, 3)."""
-    leg = point - light.position
-    r = np.linalg.norm(leg, axis=1)
-    leg /= r[:, None]
-    depth = optical_depth(reference, light.position, leg, np.zeros(len(r)), r)
-    return leg, light.intensity / (r * r)[:, None] * np.exp(-depth)
+    segment = point - light.position
+    r = np.linalg.norm(segment, axis=1)
+    segment /= r[:, None]
+    depth = optical_depth(reference, light.position, segment, np.zeros(len(r)), r)
+    return segment, light.intensity / (r * r)[:, None] * np.exp(-depth)
 
 
 def _from_infinity(reference: ReferenceScene, light: DirectionalLight, point: Array) -> tuple[Array, Array]:
@@ -170,12 +170,12 @@ def _scattered(
 ) -> Array:
     """Return what a metre of rays scatters at distances x in the full light of one light, (n, 3) [W/(m^3 sr)]."""
     direction = reference.direction[ray]
-    leg, arriving = incident(reference.origin + x[:, None] * direction)
+    segment, arriving = incident(reference.origin + x[:, None] * direction)
     from_camera = optical_depth(reference, reference.origin, direction, np.zeros(len(x)), x)
     kept = arriving * np.exp(-from_camera) / (4 * np.pi)
     total = np.zeros_like(kept)
     for medium, inside in _media(reference, ray, x, distance):
-        phase = medium.phase(np.clip(np.sum(leg * -direction, axis=1), -1, 1))
+        phase = medium.phase(np.clip(np.sum(segment * -direction, axis=1), -1, 1))
         total += np.where(inside, phase, 0)[:, None] * medium.albedo * medium.sigma_t * kept
     return total
 

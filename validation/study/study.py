@@ -127,7 +127,7 @@ class Checks:
     margins: Mapping[str, float] = field(default_factory=lambda: {"single-scatter": 0.0005, "volpath": 0.01})
     samples: Mapping[str, int] = field(default_factory=lambda: {"single-scatter": 128, "volpath": 16})
     batches: int = 2048  #: largest number of batches
-    multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the share of multiple scattering
+    multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the fraction of multiple scattering
     patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
 
 

@@ -22,7 +22,7 @@ in Poisson's distribution.
 
 **Interpolation on simplices:** the entries around a place of a regular grid, and what each counts.
 
-With the shares f of the place in its cell sorted so that f_1 >= f_2 >= .., and the strides s_i in that order,
+With the fractions f of the place in its cell sorted so that f_1 >= f_2 >= .., and the strides s_i in that order,
 
     v = v_0 (1 - f_1) + v_1 (f_1 - f_2) + .. + v_n f_n,     v_i the entry at base + s_1 + .. + s_i,
 
@@ -176,7 +176,7 @@ def way_behind(d: Array, t: float, mu: Array) -> Array:
     return np.where(mu < 0, d, t - d) / np.maximum(np.abs(mu), 1e-9)
 
 
-def place_shares(t: Any, d: Any, sun: Any) -> tuple[Any, Any, Any]:
+def place_fractions(t: Any, d: Any, sun: Any) -> tuple[Any, Any, Any]:
     """Return the coordinates of thickness, depth and the cosine of the sun's zenith angle, from 0 to 1."""
     low, high = (math.log(end + THICKNESS_SHIFT) for end in (THINNEST, THICKEST))
     upper, lower = (dr.log(1 + length / DEPTH_SCALE) for length in (d, t - d))
@@ -205,19 +205,19 @@ def around(places: tuple[Any, ...], sides: tuple[int, ...], first: Any = 0) -> l
     base: Any = mi.UInt32(first)
     pairs: list[tuple[Any, Any]] = []
     for axis, (place, side) in enumerate(zip(places, sides, strict=True)):
-        cell, share = cell_of(place * (side - 1), side)
+        cell, fraction = cell_of(place * (side - 1), side)
         stride = math.prod(sides[axis + 1 :])
         base += cell * stride
-        pairs.append((share, mi.UInt32(stride)))
+        pairs.append((fraction, mi.UInt32(stride)))
     for first, second in _NETWORKS[len(pairs)]:
         (a, p), (b, q) = pairs[first], pairs[second]
         less = a < b
         pairs[first] = dr.select(less, b, a), dr.select(less, q, p)
         pairs[second] = dr.select(less, a, b), dr.select(less, p, q)
     entries, before = [], type(pairs[0][0])(1)
-    for share, stride in pairs:
-        entries.append((base, before - share))
-        base, before = base + stride, share
+    for fraction, stride in pairs:
+        entries.append((base, before - fraction))
+        base, before = base + stride, fraction
     return [*entries, (base, before)]
 
 
@@ -236,8 +236,8 @@ def slab_phase(phase: Phase, types: ArrayTypes, *, modified: bool = False) -> An
     return AnglePhase(heights, np.array([0.0, edge, np.pi]))
 
 
-def share_of_peak(phase: Phase, types: ArrayTypes) -> float:
-    """Return the share of the light [1] that a phase function scatters by less than `CUT`."""
+def fraction_of_peak(phase: Phase, types: ArrayTypes) -> float:
+    """Return the fraction of the light [1] that a phase function scatters by less than `CUT`."""
     nodes, weights = np.polynomial.legendre.leggauss(200)
     edge = np.deg2rad(CUT)
     angles = edge * (nodes + 1) / 2

@@ -42,7 +42,7 @@ from realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[Any]  # float32 or float64
 
-_BEAM_ORDERS = 6  #: of what the beam's own peak scatters: its share to the sixth power is below rounding
+_BEAM_ORDERS = 6  #: of what the beam's own peak scatters: its fraction to the sixth power is below rounding
 _FEWEST = 2  #: modes that are kept whatever they hold: the mean needs mode 1 for its displacement
 _NO_PEAK = 1e-9
 _WIDEST = 3.0  #: panel [mean free paths]: low orders fall off by exp(-3) in one, which six nodes hold
@@ -58,7 +58,7 @@ class DirectionalMoments:
 
     `phase`, `albedo`: of the medium; `mu`: (V,), cosines of the directions, positive upwards, not 0; `streams`: N, in
     each hemisphere; `modes`: the largest mode of the azimuth; `nodes`: of each panel of depth; `negligible`: a mode is
-    followed no more where its radiance is below this share of the mean's everywhere; `single`: whether fields are
+    followed no more where its radiance is below this fraction of the mean's everywhere; `single`: whether fields are
     float32.
     """
 
@@ -153,8 +153,8 @@ class DirectionalMoments:
         largest = np.maximum(np.abs(fields[0][..., :suns]).max(2), 1e-30)
         count = len(fields)
         while count > _FEWEST:
-            share = np.abs(fields[count - 1][..., :suns]).max(2) / largest
-            if share.max() >= self._negligible:
+            fraction = np.abs(fields[count - 1][..., :suns]).max(2) / largest
+            if fraction.max() >= self._negligible:
                 break
             count -= 1
         return count

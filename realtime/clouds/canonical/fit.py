@@ -73,7 +73,7 @@ class _Samples:
     c_x: Array
     c_y: Array
     sigma: Array
-    share: Array  #: of the light of all sets
+    fraction: Array  #: of the light of all sets
 
 
 def fitted_functions(
@@ -106,7 +106,7 @@ def fit_transport(look_up: Transport, types: ArrayTypes, *, progress: Progress |
 
     `look_up`: the canonical transport; `types`: of its numbers; `progress`: called with (share done, what).
     """
-    tell = progress or (lambda share, what: None)
+    tell = progress or (lambda fraction, what: None)
     samples = _samples(look_up, types)
     fitted = []
     for number, of_set in enumerate(samples):
@@ -129,7 +129,7 @@ def _directions(count: int) -> Array:
     return values
 
 
-def _direction_share(mu: Any) -> Any:
+def _direction_fraction(mu: Any) -> Any:
     """Return the coordinate of a direction, from 0 to 1."""
     v = dr.safe_acos(dr.fma(-2, dr.abs(mu), 1)) * dr.inv_pi
     return dr.fma(dr.mulsign(v, mu), 0.5, 0.5)
@@ -250,7 +250,7 @@ def _fit_direction(samples: _Samples, number: int) -> tuple[Array, Array]:
     from scipy.optimize import least_squares
 
     part = (slice(None), slice(None), slice(None), number)
-    seen = samples.share[part] > _DIM
+    seen = samples.fraction[part] > _DIM
     if seen.sum() < 40:
         seen = samples.T[part] > 0
     d, mu_l, phi, sigma = (each[part][seen] for each in (samples.d, samples.mu_l, samples.phi, samples.sigma))
@@ -280,7 +280,7 @@ def _fit_spread(samples: _Samples) -> Array:
     """Return O, Q, R, S, T."""
     from scipy.optimize import least_squares
 
-    seen = samples.share > _DIM
+    seen = samples.fraction > _DIM
     t, d, sigma = (each[seen][::3] for each in (samples.t, samples.d, samples.sigma))
 
     def model(x: Array) -> Array:
@@ -327,8 +327,8 @@ class DeviceFit:
         d = dr.clip(d, 0, t)
         sun = dr.clip(mu_l, coordinates.LOWEST_SUN, 1)
         phi_l = dr.acos(sun)
-        at_t, _, at_sun = coordinates.place_shares(t, d, sun)
-        at_mu = _direction_share(dr.clip(mu, -1, 1))
+        at_t, _, at_sun = coordinates.place_fractions(t, d, sun)
+        at_mu = _direction_fraction(dr.clip(mu, -1, 1))
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
         (p,) = between_entries(table["p"], [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1)
         direction, height = (at_mu, _DIRECTIONS), (at_sun, _SUNS)

@@ -19,8 +19,8 @@ five pairs of weights would read 32. All sets have one code: the number of the s
 Outside of the grid:
 
 - a point above the lit face counts as on it, one below the other face as on that (Bouthors 2008, 5.1);
-- thinner than 0.01 and thicker than 200: c, sigma and the source are those of that thickness at the same share of the
-  depth; of thinner slabs T falls with the thickness;
+- thinner than 0.01 and thicker than 200: c, sigma and the source are those of that thickness at the same fraction of
+  the depth; of thinner slabs T falls with the thickness;
 - a sun lower than mu_L = 0.02: c and sigma are those of 0.02, and T falls with mu_L, to 0 at 0 and below.
 """
 
@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.coordinates import ENTRIES, SETS, around, at_angle, place_shares, repeated_scattering
+from realtime.clouds.canonical.coordinates import ENTRIES, SETS, around, at_angle, place_fractions, repeated_scattering
 from realtime.clouds.canonical.directional_moments import DirectionalMoments
 from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
 from realtime.clouds.slab_orders.phases import SlabPhase
@@ -111,13 +111,13 @@ def logged(made: str) -> Progress:
     """
     began = last = time.monotonic()
 
-    def tell(share: float, what: str) -> None:
+    def tell(fraction: float, what: str) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last > _PATIENCE and 0 < share < 1:
+        if now - last > _PATIENCE and 0 < fraction < 1:
             last = now
-            left = (now - began) * (1 - share) / share
-            _LOG.warning("%s, made once: %.0f %%, about %.0f s left, %s", made, 100 * share, left, what)
+            left = (now - began) * (1 - fraction) / fraction
+            _LOG.warning("%s, made once: %.0f %%, about %.0f s left, %s", made, 100 * fraction, left, what)
 
     return tell
 
@@ -268,7 +268,7 @@ class TransportGrid:
         d = dr.clip(d, 0, t)
         sun = dr.clip(mu_l, coordinates.LOWEST_SUN, 1)
         inside = dr.clip(t, coordinates.THINNEST, coordinates.THICKEST)
-        place = place_shares(inside, d * (inside / t), sun)
+        place = place_fractions(inside, d * (inside / t), sun)
         direction = dr.fma(dr.asin(dr.clip(mu, -1, 1)), dr.inv_pi, 0.5)
         azimuth = dr.safe_acos(cos_phi) * dr.inv_pi
         source, x, y, log_sigma = _between(

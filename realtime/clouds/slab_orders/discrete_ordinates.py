@@ -108,7 +108,7 @@ class Eigenmodes:
     """The discrete-ordinate equations of one mode of the azimuth, decoupled.
 
     `streams`: the directions; `m`: the mode; `albedo`: in [0, 1]; `moments`: (2 N,), of the phase function less its
-    peak; `peak`: share of the scattered light that goes on in its direction.
+    peak; `peak`: fraction of the scattered light that goes on in its direction.
     """
 
     def __init__(self, streams: Streams, m: int, *, albedo: float, moments: Array, peak: float):

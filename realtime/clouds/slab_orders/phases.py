@@ -65,8 +65,8 @@ class AnglePhase:
         edges = np.append(np.concatenate(parts), self.breaks[-1])
         width = np.diff(edges)[:, None]
         angles = (edges[:-1, None] + width * (nodes + 1) / 2).reshape(-1)
-        shares = np.sin(angles) * (width / 4 * weights).reshape(-1) * self.heights(angles)
-        return np.cos(angles), shares
+        fractions = np.sin(angles) * (width / 4 * weights).reshape(-1) * self.heights(angles)
+        return np.cos(angles), fractions
 
     @property
     def _mean(self) -> float:
@@ -74,11 +74,11 @@ class AnglePhase:
 
     def moments(self, count: int) -> Array:
         """Return the moments by quadrature."""
-        cosines, shares = self._nodes
+        cosines, fractions = self._nodes
         moments = np.empty(count)
         before, now = np.zeros_like(cosines), np.ones_like(cosines)
         for degree in range(count):
-            moments[degree] = shares @ now
+            moments[degree] = fractions @ now
             before, now = now, ((2 * degree + 1) * cosines * now - degree * before) / (degree + 1)
         return moments / self._mean
 

@@ -8,9 +8,9 @@ pixels (Engelhardt and Dachsbacher 2010; Yusov 2013).
 
 Three things differ from what is published, all to the good of the method: each lit interval is integrated by a kernel
 and not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what
-is interpolated is not the airlight but the share of it that is lit: the published scenes are lit by the sun, and near a
-point light the airlight itself goes as 1 / distance, and as the phase function. A share lies between 0 and 1, so no
-pixel between samples is brighter than it is without shadows.
+is interpolated is not the airlight but the fraction of it that is lit: the published scenes are lit by the sun, and
+near a point light the airlight itself goes as 1 / distance, and as the phase function. A fraction lies between 0 and 1,
+so no pixel between samples is brighter than it is without shadows.
 
 The sampling is no wrapper around other methods, as `realtime.frame.adaptive_sampling` is. Slices are cut for one light
 and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels.
@@ -139,8 +139,8 @@ class MinMax(Method):
             return airlight.radiance(_lit_integral(airlight, heights, _nearest(cut, point)))
         depth = _depth_image(cut, point, view.distance)
         drawn = mark_samples(cut, depth, count=_whole_words(self.samples, camera), step=self.step)
-        shares = _sampled_shares(view, light, kernel, drawn, heights)
-        return airlight.radiance(_interpolated(airlight, drawn, shares, heights, point))
+        fractions = _sampled_fractions(view, light, kernel, drawn, heights)
+        return airlight.radiance(_interpolated(airlight, drawn, fractions, heights, point))
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
@@ -186,11 +186,11 @@ def _depth_image(slices: Slices, point, distance):
     return image
 
 
-def _sampled_shares(view: View, light: Light, kernel, samples: Samples, heights: SliceHeights):
-    """Return by sample, of those that are marked, the share of its airlight that is lit."""
+def _sampled_fractions(view: View, light: Light, kernel, samples: Samples, heights: SliceHeights):
+    """Return by sample, of those that are marked, the fraction of its airlight that is lit."""
     marked, count = marked_samples(samples)
     camera = view.camera
-    shares = dr.empty(type(view.lit_by(light).nothing(1)), dr.width(marked))
+    fractions = dr.empty(type(view.lit_by(light).nothing(1)), dr.width(marked))
 
     def computed(lane):
         sample = dr.gather(mi.UInt32, marked, lane)
@@ -199,23 +199,23 @@ def _sampled_shares(view: View, light: Light, kernel, samples: Samples, heights:
         rays = view.medium.rays(view.origin, direction)
         seen = replace(view, **vars(rays), distance=depth)
         airlight = seen.lit_by(light, kernel)
-        share = _lit_integral(airlight, heights, slice_number) / airlight.gamma(airlight.rays.distance)
-        dr.scatter(shares, dr.select(dr.isfinite(share), share, no_value(share)), sample)
+        fraction = _lit_integral(airlight, heights, slice_number) / airlight.gamma(airlight.rays.distance)
+        dr.scatter(fractions, dr.select(dr.isfinite(fraction), fraction, no_value(fraction)), sample)
         return lane
 
     lane = spread(dr.width(marked))
     # Most of the room is empty: a branch steps over it.
     dr.if_stmt(args=(lane,), cond=lane < count, true_fn=computed, false_fn=lambda lane: lane)
-    dr.eval(shares)
-    return shares
+    dr.eval(fractions)
+    return fractions
 
 
-def _interpolated(airlight: LitRays, samples: Samples, shares, heights: SliceHeights, point):
-    """Return the integral of every pixel: the share of the samples around it, or its own where they do not fit."""
-    share, fits = between_samples(samples, shares, point, airlight.rays.distance)
+def _interpolated(airlight: LitRays, samples: Samples, fractions, heights: SliceHeights, point):
+    """Return the integral of every pixel: the fraction of the samples around it, or its own where they do not fit."""
+    fraction, fits = between_samples(samples, fractions, point, airlight.rays.distance)
     # Next to a light, samples gather most of their airlight at other places than the pixel, and where it lies on a
     # surface they end before it, or beyond.
     pixel = dr.norm(airlight.rays.camera.left)
     fits &= airlight.geometry.height > _NEXT * pixel * dr.abs(airlight.geometry.foot)
     own = _lit_integral(airlight, heights, _nearest(samples.slices, point), ~fits)
-    return dr.select(fits, share * airlight.gamma(airlight.rays.distance), own)
+    return dr.select(fits, fraction * airlight.gamma(airlight.rays.distance), own)

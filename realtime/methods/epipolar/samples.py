@@ -130,11 +130,11 @@ def between_samples(samples: Samples, values, point, depth):
     place = slice_coordinate(samples.slices, *point)
     low = dr.floor(place)
     total, weights = type(values)(0), type(depth)(0)
-    for step, share in ((0, 1 - (place - low)), (1, place - low)):
+    for step, fraction in ((0, 1 - (place - low)), (1, place - low)):
         number = neighbour(samples.slices, mi.Int32(low) + step)
         for value, weight in _on_slice(samples, values, number, point, depth):
-            total += value * (share * weight)
-            weights += share * weight
+            total += value * (fraction * weight)
+            weights += fraction * weight
     return total / dr.maximum(weights, 1e-20), weights > LEAST
 
 
@@ -144,7 +144,7 @@ def _on_slice(samples: Samples, values, number, point, depth):
     i, j = ends.z - ends.x, ends.w - ends.y
     length = dr.maximum(i * i + j * j, 1e-10)
     along = ((point[0] - ends.x) * i + (point[1] - ends.y) * j) * ((samples.count - 1) / length)
-    k, share = cell_of(along, samples.count)
+    k, fraction = cell_of(along, samples.count)
     left, right = _marked_about(samples, number, k)
     left_value, right_value = (dr.gather(type(values), values, number * samples.count + at) for at in (left, right))
     has_left, has_right = (_first(value) >= 0 for value in (left_value, right_value))
@@ -154,7 +154,7 @@ def _on_slice(samples: Samples, values, number, point, depth):
     )
     pace = dr.rcp(type(along)(right - left))
     weighted = []
-    for step, near in ((0, 1 - share), (1, share)):
+    for step, near in ((0, 1 - fraction), (1, fraction)):
         value = left_value + (right_value - left_value) * (type(along)(k + step - left) * pace)
         agreement = _agreement(depth, _sample_depth(samples, ends, mi.Int32(k) + step))
         weighted.append((value, dr.select(has_left | has_right, near * agreement, 0)))

@@ -57,10 +57,10 @@ def accumulated(view: View, grid: Grid, rays: Rays, scattered: PerRay) -> Any:
         source = dr.gather(Color, scattered, number * grid.columns + column)
         passed = [dr.exp(-depth) for depth in depths]
         weights = [
-            share * thickness * _mean_transmittance(depth, end) for share, depth, end in zip(kept, depths, passed)
+            fraction * thickness * _mean_transmittance(depth, end) for fraction, depth, end in zip(kept, depths, passed)
         ]
         total = total + source * (weights[0] if len(weights) == 1 else Color(*weights))
-        kept = [share * end for share, end in zip(kept, passed)]
+        kept = [fraction * end for fraction, end in zip(kept, passed)]
         value = four_numbers(Float)(total.x, total.y, total.z, 0)
         dr.scatter(volume, value, (number + 1) * grid.columns + column)
         return number + 1, end, kept, total
@@ -94,5 +94,5 @@ def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:
     u = (Float(column) + 0.5) * (grid.width / camera.width) - 0.5
     v = (Float(row) + 0.5) * (grid.height / camera.height) - 0.5
     depth = dr.minimum(view.distance * dr.dot(view.direction, camera.forward), grid.far)
-    s = grid.share(depth) * grid.slices
+    s = grid.fraction(depth) * grid.slices
     return type(view.medium.albedo)(trilinear(volume, (grid.width, grid.height, grid.slices + 1), (u, v, s)))

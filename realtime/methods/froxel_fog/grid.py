@@ -51,7 +51,7 @@ class Grid:
         """Return z(s) [m]."""
         return self.far / _RATIO * (dr.exp(s * math.log(1 + _RATIO)) - 1)
 
-    def share(self, depth: Metres) -> PerRay:
+    def fraction(self, depth: Metres) -> PerRay:
         """Return s(z); `depth` is z [m]."""
         return dr.log(1 + depth / self.far * _RATIO) / math.log(1 + _RATIO)
 
@@ -134,9 +134,9 @@ def trilinear(volume: Any, size: tuple[int, int, int], place: tuple[Any, Any, An
     for k, layer in enumerate(z):
         for j, row in enumerate(y):
             for i, column in enumerate(x):
-                share = Float(1)
+                fraction = Float(1)
                 for side, weight in zip((i, j, k), weights):
-                    share = share * (weight if side else 1 - weight)
+                    fraction = fraction * (weight if side else 1 - weight)
                 index = (layer * size[1] + row) * size[0] + column
-                value = dr.fma(dr.gather(four_numbers(Float), volume, index), share, value)
+                value = dr.fma(dr.gather(four_numbers(Float), volume, index), fraction, value)
     return value.xyz

@@ -5,7 +5,7 @@ With P that point, r its distance from the light, T the transmittance from there
 
     S = 1/(4 pi) sum_lights I V T / max(r^2, b^2)  sum_media c albedo sigma_t p        [W/(m^3 sr)],
 
-c the share of the froxel that the medium fills. For a directional light, I / r^2 is the irradiance.
+c the fraction of the froxel that the medium fills. For a directional light, I / r^2 is the irradiance.
 
 About a light 1/r^2 has no bound, though its mean over a froxel has. With a half the diagonal of the froxel, the mean of
 1/r^2 over a ball of the radius a about the light is

@@ -304,11 +304,11 @@ def tolerance() -> Any:
     """Return the field of the parameter that every method has whose rays can be interpolated."""
     return parameter(
         0.0,
-        "what may be interpolated between the corners of tiles, as a share of the airlight; 0: nothing, every pixel is "
+        "what may be interpolated between the corners of tiles, as a fraction of the airlight; 0: nothing, all are "
         "computed",
         least=0,
         below=1,
-        wanted="a share of the airlight from 0 up to 1",
+        wanted="a fraction of the airlight from 0 up to 1",
     )
 
 

@@ -140,10 +140,10 @@ def _on_wall(line: Line, over: Passage):
     x, y = ([at_line(pair, t) - low for t in over.t] for pair, low in zip((ray.u, ray.v), over.place))
     at_begin, at_end = (value_at(parts.line, *point) for point in zip(x, y))
     from_second, to_second = at_begin > 0, at_end > 0
-    share = dr.select(from_second ^ to_second, at_begin / (at_begin - at_end), 1)
-    middle = dr.fma(share, end - begin, begin)
-    x.insert(1, dr.fma(share, x[1] - x[0], x[0]))
-    y.insert(1, dr.fma(share, y[1] - y[0], y[0]))
+    fraction = dr.select(from_second ^ to_second, at_begin / (at_begin - at_end), 1)
+    middle = dr.fma(fraction, end - begin, begin)
+    x.insert(1, dr.fma(fraction, x[1] - x[0], x[0]))
+    y.insert(1, dr.fma(fraction, y[1] - y[0], y[0]))
     s = [at_line(ray.s, t) for t in (begin, middle, end)]
 
     def excess(place, second):

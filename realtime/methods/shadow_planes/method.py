@@ -105,7 +105,7 @@ class ShadowPlanes(Method):
     )
     media: str = parameter(
         "kernel",
-        "bounded media: the true depth on both legs, or the constant R of section 4.2 as it is meant or as printed; "
+        "bounded media: the true depth on both segments, or the constant R of section 4.2 as meant or as printed; "
         "`kernel` is `paper` with a polynomial kernel and otherwise `exact`, which asks no kernel",
         choices=("kernel", *FORMS),
     )

@@ -53,10 +53,11 @@ def occluder_plan(scene: Scene) -> OccluderPlan:
 def describe_occluders(plan: OccluderPlan) -> dict[str, str]:
     """Return the plan in words, one entry for each decision."""
     if not plan.triangles:
-        return {"casters": "none: no silhouettes, no planes; one integral a ray and light"}
+        return {"occluders": "none: no silhouettes, no planes; one integral a ray and light"}
     words = {
         "shadows": "silhouettes and planes: no shadow rays",
-        "casters": f"{plan.shapes} shapes, {plan.triangles} triangles in {plan.components} parts, {plan.closed} closed",
+        "occluders": f"{plan.shapes} shapes, {plan.triangles} triangles in {plan.components} parts, "
+        f"{plan.closed} closed",
     }
     for number, light in enumerate(plan.lights):
         out = plan.components - light.components

@@ -187,7 +187,7 @@ def _walk(sweep: _Sweep, active, *, places: int):
     """Go over the planes in the order of the list.
 
     Returns `passed`: what the ray has passed, right where it is not lost; `lost`: whether the order was wrong, or wrong
-    by more than the queue could mend.
+    by more than the queue could repair.
     """
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     count = sweep.ray.count

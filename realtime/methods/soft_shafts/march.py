@@ -58,7 +58,7 @@ def source_state(
 
 
 @dataclass(frozen=True)
-class Share:
+class Fraction:
     """The part of an area light that each ray takes: one light sample, with a shift of its steps."""
 
     number: Any  #: of the light sample
@@ -66,17 +66,17 @@ class Share:
 
 
 def integral_of_points(
-    view: View, state: SourceState, points: int, share: Share | None, p: SoftShaftsParameters
+    view: View, state: SourceState, points: int, fraction: Fraction | None, p: SoftShaftsParameters
 ) -> Any:
     """Return the sum of the airlight integrals of the points of an area light [1/m].
 
     `view`: the rays, in one medium without bounds; `state`: the light, with its maps if `shadow=map`; `points`: how
-    many points it has; `share`: one point for each ray, counted `points` times; None for all; `p`: the parameters.
+    many points it has; `fraction`: one point for each ray, counted `points` times; None for all; `p`: the parameters.
     """
     Float = type(view.distance)
     nothing = view.lit_by(view.lights[0]).nothing(dr.width(view.distance))
-    if share is not None:
-        return points * _of_point(view, state, share.number, share.shift, p)
+    if fraction is not None:
+        return points * _of_point(view, state, fraction.number, fraction.shift, p)
 
     return summed(points, lambda number: _of_point(view, state, number, Float(0.5), p), nothing)
 

@@ -11,12 +11,13 @@ The stages of a frame:
 1. `prepare`: a table of the light samples, and their maps.
 2. Airlight of every `scale`-th pixel by `steps` steps for each point (`march.py`), a number per ray and light.
 3. The bilateral filter, on log(1 + L / mean L), and joint up-sampling with a depth test.
-4. The share of each light that reaches each pixel's surface (`surfaces.py`), and its filter, before anything is shaded.
-5. The frame multiplies the unshadowed surface by that share and adds the airlight, both in linear radiance.
+4. The fraction of each light that reaches each pixel's surface (`surfaces.py`), and its filter, before anything is
+   shaded.
+5. The frame multiplies the unshadowed surface by that fraction and adds the airlight, both in linear radiance.
 
 With `interleave` each pixel of a tile of 4 x 4 takes one of the points and a shift of the steps of its own; the mean
-over the tile, by depth, is that of all points and of sixteen times as many steps. The mean of the share is a ratio of
-two means (Heitz, Hill, McGuire 2018): what a tile does not shadow is not noisy.
+over the tile, by depth, is that of all points and of sixteen times as many steps. The mean of the fraction is a ratio
+of two means (Heitz, Hill, McGuire 2018): what a tile does not shadow is not noisy.
 
 Lights without extent are one point. Their surfaces are lit by shadow rays and have no penumbra to filter. In bounded
 media every point of a light is asked, also with `interleave`.
@@ -45,7 +46,7 @@ from realtime.image_filters import (
 )
 from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.method import Layers, View
-from realtime.methods.soft_shafts.march import Share, SourceState, integral_of_points, source_state
+from realtime.methods.soft_shafts.march import Fraction, SourceState, integral_of_points, source_state
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
 from realtime.methods.soft_shafts.surfaces import (
     AUTO_WIDTH,
@@ -69,7 +70,7 @@ _GROUP = 4  # how many light samples a pixel of a narrow penumbra asks
 
 @dataclass(frozen=True)
 class SoftShafts(SoftShaftsParameters):
-    """The airlight of every ray, and the share of each light that reaches its surface.
+    """The airlight of every ray, and the fraction of each light that reaches its surface.
 
     References
     ----------
@@ -159,9 +160,9 @@ class _Frame:
                 for place, light in enumerate(source)
             )
         else:
-            share = self._share(self.few_raster, lights) if p.interleave else None
-            integral = integral_of_points(few, self.states[number], len(lights), share, p)
-            if share is not None:
+            fraction = self._fraction(self.few_raster, lights) if p.interleave else None
+            integral = integral_of_points(few, self.states[number], len(lights), fraction, p)
+            if fraction is not None:
                 integral = tile_average(integral, self.few_raster, guides=(self.few_depth,))
         integral = _smooth_airlight(integral, self.few_raster, depth=self.few_depth, p=p)
         dr.eval(integral, self.few_depth)
@@ -175,7 +176,7 @@ class _Frame:
         return view.medium.radiance(lights[0], integral)
 
     def visibility(self, number: int, source: list[int]) -> list[Any]:
-        """Return the share of a source that reaches the surfaces, or one for each of its lights."""
+        """Return the fraction of a source that reaches the surfaces, or one for each of its lights."""
         view, p, whole = self.view, self.parameters, self.whole
         lights = [view.lights[light] for light in source]
         if not view.features.shadows or not view.features.surfaces:
@@ -189,14 +190,14 @@ class _Frame:
         if p.filter == "none" and not p.interleave:
             return [there & self._reached(state, place, light, point) for place, light in enumerate(lights)]
         if p.interleave:
-            number = self._share(self.raster, lights).number
+            number = self._fraction(self.raster, lights).number
             own = reached_surfaces(whole, state, lambda _: number, 1, p)
             if p.narrow:
                 # With the means over tiles: who asks for it later would cast its rays again.
                 dr.schedule(own.lit, own.all)
-            lit = self._over_tiles(own).share
+            lit = self._over_tiles(own).fraction
         else:
-            lit = reached_surfaces(whole, state, lambda index: index, len(lights), p).share
+            lit = reached_surfaces(whole, state, lambda index: index, len(lights), p).fraction
         if p.hd == AUTO:
             dr.eval(lit)
             width = self._penumbra_width(state, len(lights))
@@ -207,7 +208,9 @@ class _Frame:
             lit = self._smooth_by_width(lit, width, len(lights))
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
-            lit = _smooth_share(lit, self.raster, there=there, depth=self.depth, points=len(lights), levels=levels, p=p)
+            lit = _smooth_fraction(
+                lit, self.raster, there=there, depth=self.depth, points=len(lights), levels=levels, p=p
+            )
         lit = dr.clip(lit, 0, 1)
         dr.eval(lit)
         lit = dr.gather(type(lit), lit, view.pixel)
@@ -220,7 +223,7 @@ class _Frame:
         return penumbra_width(blockers, distance, camera, state.width, self.raster, guide=self.depth)
 
     def _over_tiles(self, reached: Reached) -> Reached:
-        """Return the means over a tile: the share is then one mean over another."""
+        """Return the means over a tile: the fraction is then one mean over another."""
         sums = two_numbers(type(self.view.distance))(reached.lit, reached.all)
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
 
@@ -238,14 +241,14 @@ class _Frame:
             return number // group * group + (number + 1 + index) % group
 
         more = reached_surfaces(self.whole, state, other, group - 1, p, asked)
-        lit = dr.select(asked, Reached(own.lit + more.lit, own.all + more.all).share, lit)
+        lit = dr.select(asked, Reached(own.lit + more.lit, own.all + more.all).fraction, lit)
         dr.eval(lit)
         return lit
 
     def _smooth_by_width(self, lit: Any, width: Any, points: int) -> Any:
         p = self.parameters
-        share, least = (AUTO_WIDTH_SHARED, _LEAST_SHARED) if p.interleave else (AUTO_WIDTH, _LEAST_AUTO)
-        hd = dr.clip(share / points * width, least, _MOST_AUTO)
+        fraction, least = (AUTO_WIDTH_SHARED, _LEAST_SHARED) if p.interleave else (AUTO_WIDTH, _LEAST_AUTO)
+        hd = dr.clip(fraction / points * width, least, _MOST_AUTO)
         return separable(lit, self.raster, hd=hd, guides=(self.depth,), support=2.0, most=_MOST_AUTO)
 
     def _lit(self, number: int, light: int, place: int) -> Callable[[Any], Any]:
@@ -270,7 +273,7 @@ class _Frame:
         assert isinstance(state.maps, HemisphereMaps)
         return state.maps.lit_surface(mi.UInt32(place), local)
 
-    def _share(self, raster: Raster, lights: list[Any]) -> Share:
+    def _fraction(self, raster: Raster, lights: list[Any]) -> Fraction:
         """Return which light sample each pixel takes, and how far its steps are shifted."""
         column, row = raster.places()
         # The order of ordered dithering (Bayer 1973): pixels side by side are far apart in it, and so are their points.
@@ -278,7 +281,7 @@ class _Frame:
         order = (other & 1) * 8 + (row & 1) * 4 + (other & 2) + ((row & 2) >> 1)
         # Another lattice, so that the shifts of neighbouring points are far apart too.
         shift = (order * 7 + 3) & 15
-        return Share(order % len(lights), (type(self.view.distance)(shift) + 0.5) / 16)
+        return Fraction(order % len(lights), (type(self.view.distance)(shift) + 0.5) / 16)
 
 
 def _nearer(state: SourceState, place: int, point: Any) -> Any:
@@ -288,24 +291,24 @@ def _nearer(state: SourceState, place: int, point: Any) -> Any:
     return state.maps.lit(mi.UInt32(place), local)
 
 
-def _smooth_share(
-    share: Any, raster: Raster, *, there: Any, depth: Guide, points: int, levels: bool, p: SoftShaftsParameters
+def _smooth_fraction(
+    fraction: Any, raster: Raster, *, there: Any, depth: Guide, points: int, levels: bool, p: SoftShaftsParameters
 ) -> Any:
-    """Return the share of a light that reaches the surfaces, filtered.
+    """Return the fraction of a light that reaches the surfaces, filtered.
 
-    `share`: from 0 to 1, row by row; `raster`: the image; `there`: where there are surfaces: the sky takes no part;
-    `depth`: the guide of their depth; `points`, `levels`: N, and whether the share has N + 1 levels; `p`: the
+    `fraction`: from 0 to 1, row by row; `raster`: the image; `there`: where there are surfaces: the sky takes no part;
+    `depth`: the guide of their depth; `points`, `levels`: N, and whether the fraction has N + 1 levels; `p`: the
     parameters, with a filter whose `hd` is a number.
     """
     if p.filter == "gauss" or p.guide == "self":
         hr = math.inf if p.filter == "gauss" else p.hr
         if levels:
-            return bilateral_of_levels(share, raster, levels=points, hd=p.width, hr=hr, there=there)
+            return bilateral_of_levels(fraction, raster, levels=points, hd=p.width, hr=hr, there=there)
         # The sky is unlike all surfaces.
-        sky = Guide(dr.select(there, type(share)(0), 1), 1e-3)
-        guides = (sky,) if math.isinf(hr) else (sky, Guide(share, hr))
-        return _filtered(share, raster, guides, p.width)
-    return _filtered(share, raster, (depth,), p.width)
+        sky = Guide(dr.select(there, type(fraction)(0), 1), 1e-3)
+        guides = (sky,) if math.isinf(hr) else (sky, Guide(fraction, hr))
+        return _filtered(fraction, raster, guides, p.width)
+    return _filtered(fraction, raster, (depth,), p.width)
 
 
 def _smooth_airlight(integral: Any, raster: Raster, *, depth: Guide, p: SoftShaftsParameters) -> Any:

@@ -107,7 +107,7 @@ class SoftShaftsParameters(Method):
 
     @property
     def by_source(self):
-        """All points of a light have one share: without filter each has its own, and the sum is exact."""
+        """All points of a light have one fraction: without filter each has its own, and the sum is exact."""
         return self.filter != "none" or self.interleave
 
     def error_causes(self, size):

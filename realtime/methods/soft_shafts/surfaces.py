@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which share of an area light reaches the visible surfaces, and how wide its penumbrae are there.
+"""Which fraction of an area light reaches the visible surfaces, and how wide its penumbrae are there.
 
 The mean over N light samples has N + 1 levels. Points of a sphere face different ways: there each counts with its
 cosine at the light over the square of its distance, as it counts in the irradiance.
@@ -47,7 +47,7 @@ class Reached:
     all: Any  #: sum of all weights
 
     @property
-    def share(self) -> Any:
+    def fraction(self) -> Any:
         """From 0 to 1; 1 where no point could reach the surface."""
         return dr.select(self.all > 0, self.lit / self.all, 1)
 
@@ -91,7 +91,7 @@ def _of_point(view: View, state: SourceState, place: Any, there: Any, number: An
     a, b, c = frame.local(place - frame.position)
     square = dr.fma(a, a, dr.fma(b, b, c * c))
     r = dr.sqrt(square)
-    weight = Float(1) if state.flat and share_is_plain(p) else dr.maximum(c, 0) / (square * r)
+    weight = Float(1) if state.flat and fraction_is_plain(p) else dr.maximum(c, 0) / (square * r)
     if not view.features.shadows:
         lit = there
     elif p.surfaces == "map":
@@ -102,8 +102,8 @@ def _of_point(view: View, state: SourceState, place: Any, there: Any, number: An
     return [dr.select(there & lit, weight, 0), dr.select(there, weight, 0)]
 
 
-def share_is_plain(p: SoftShaftsParameters) -> bool:
-    """Return whether every light sample counts alike, so that the share has N + 1 levels."""
+def fraction_is_plain(p: SoftShaftsParameters) -> bool:
+    """Return whether every light sample counts alike, so that the fraction has N + 1 levels."""
     return not p.interleave
 
 

@@ -171,6 +171,6 @@ class BoundedMedia(Homogeneous):
         # What it refuses must be raised here, not in a branch. Nothing is computed that nobody reads.
         zero = type(geometry.height)(0)
         for own in self.bounded_media:
-            leg = own.medium.sigma_t[0], zero, own.mean_distance, form == "printed"
-            polynomial(geometry, zero, zero, light, own.medium.phase, leg)
+            segment = own.medium.sigma_t[0], zero, own.mean_distance, form == "printed"
+            polynomial(geometry, zero, zero, light, own.medium.phase, segment)
         return BoundedRays(self, light, rays, geometry, kernel, pieces, form, polynomial)

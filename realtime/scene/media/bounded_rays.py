@@ -17,7 +17,7 @@ a spot begins to fall, all of this is smooth. A panel ends at a bend, and sooner
 
 * turn by more than some angle about the light, which depends on the phase function (`realtime.scene.rule_reach`),
 * be optically thicker than some depth, both paths together,
-* change 1 + e by more than some share of it: the length rises steeply where a path grazes its facet.
+* change 1 + e by more than some fraction of it: the length rises steeply where a path grazes its facet.
 
 In a panel of n nodes the rule of Gauss and Legendre is used in t from 0 to 1 with the tangent of the angle at the light
 from the panel's beginning linear in t: with the ends s_0 and s_1 from the foot, h the height and D = h^2 + s_0 s_1,
@@ -282,13 +282,13 @@ def _panel(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x
             far = t * square0
             s = dr.fma(length, far / dr.fma(1 - t, product, far), s0)
             x, r = s + ray.geometry.foot, dr.sqrt(dr.fma(s, s, h * h))
-            share = weight / dr.fma(t * t, tangent, 1)
+            fraction = weight / dr.fma(t * t, tangent, 1)
         else:
-            x, r, share = dr.fma(t, length, x0), Float(1), weight
-        share = share * _scattered(ray, piece, x, r)
+            x, r, fraction = dr.fma(t, length, x0), Float(1), weight
+        fraction = fraction * _scattered(ray, piece, x, r)
         lengths = [(path.bounded.medium, path.length(own, x, r)) for path, own in zip(paths, envelopes)]
         for channel, depth in enumerate(_depths(ray, piece, x, r, lengths)):
-            totals[channel] += share * exp_bounded(-depth)
+            totals[channel] += fraction * exp_bounded(-depth)
     return [scale * total for total in totals]
 
 

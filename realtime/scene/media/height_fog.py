@@ -114,13 +114,13 @@ class HeightFog(VaryingMedium):
         _, (start, rise) = rays.crossed
         z, longest = dr.fma(rise, x, start), depth / self.constant
         for layer in self.layers:
-            share = depth / (layer.sigma_t * self._fall(layer, z))
+            fraction = depth / (layer.sigma_t * self._fall(layer, z))
             c = rise / layer.scale_height
-            bend = c * share
+            bend = c * fraction
             # From below the base a clamped layer grows no faster than at the base.
-            grown = dr.select(dr.abs(bend) < 1e-3, share, dr.select(bend < 1, -dr.log(1 - bend) / c, dr.inf))
+            grown = dr.select(dr.abs(bend) < 1e-3, fraction, dr.select(bend < 1, -dr.log(1 - bend) / c, dr.inf))
             if self.clamped:
-                grown = dr.select((z < layer.base) | (rise < 0), share, grown)
+                grown = dr.select((z < layer.base) | (rise < 0), fraction, grown)
             longest = dr.minimum(longest, grown)
         return longest
 
@@ -277,15 +277,17 @@ class HeightRays(LitRays):
             return longest
         z = dr.fma(rise, x, start)
         whole, part, low = self._to_light(z)
-        density, leg, falling, steepest = medium.constant, medium.constant * part, 0, 0
+        density, segment, falling, steepest = medium.constant, medium.constant * part, 0, 0
         for layer in medium.layers:
             here, steep = medium._fall(layer, z), dr.rcp(layer.scale_height)
             own = layer.sigma_t * here
             density, falling, steepest = density + own, dr.fma(own, steep, falling), dr.maximum(steepest, steep)
-            leg = dr.fma(layer.sigma_t, medium._column(layer, low, part, (here, medium._fall(layer, self.end))), leg)
+            segment = dr.fma(
+                layer.sigma_t, medium._column(layer, low, part, (here, medium._fall(layer, self.end))), segment
+            )
         # Upwards the layers by their share in the density; downwards, where it grows, any can become the largest.
         steep = rise * dr.select(rise > 0, falling * dr.rcp(dr.maximum(density, 1e-30)), steepest)
-        thick = dr.maximum(dr.fma(-0.5 * _DEPTH, dr.minimum(steep, 0), density), leg * dr.rcp(whole))
+        thick = dr.maximum(dr.fma(-0.5 * _DEPTH, dr.minimum(steep, 0), density), segment * dr.rcp(whole))
         rate = dr.maximum((1 / _DEPTH) * thick, (1 / _SCALE_HEIGHTS) * dr.abs(steep))
         return longest * dr.rsqrt(dr.fma(longest * rate, longest * rate, 1))
 
@@ -314,29 +316,29 @@ class HeightRays(LitRays):
         after = before + across
         at_lowest, sign = dr.select(up, before, after), dr.select(up, Float(1), -1)
         (n0, d0), (n1, d1) = _roots(low - foot, h), _roots(high - foot, h)
-        share = length / dr.fma(n0, n1, d0 * d1)
+        fraction = length / dr.fma(n0, n1, d0 * d1)
         total = Float(0)
         for t, weight in unit_nodes(self.nodes or (_NODES if is_single(Float) else _NODES_DOUBLE)):
             n, d = dr.fma(n1 - n0, t, n0), dr.fma(d1 - d0, t, d0)
             square_n, square_d = dr.square(n), dr.square(d)
             inverse, scale = dr.rcp(square_n + square_d), 0.5 * h * dr.rcp(n * d)
-            far, r = share * t * (dr.fma(n, n0, d * d0) * scale), (square_n + square_d) * scale
+            far, r = fraction * t * (dr.fma(n, n0, d * d0) * scale), (square_n + square_d) * scale
             whole, part, lower = self._to_light(dr.fma(rise, far, z_low))
-            density, camera, leg = medium.constant, medium.constant * far, medium.constant * part
+            density, camera, segment = medium.constant, medium.constant * far, medium.constant * part
             for layer, steep, at_low, along, at_end in layers:
                 kept, less = exp_expm1_bounded(-steep * far)
                 here = at_low * kept
                 density = dr.fma(layer.sigma_t, here, density)
                 camera = dr.fma(layer.sigma_t * along, less, camera)
-                leg = dr.fma(layer.sigma_t, medium._column(layer, lower, part, (here, at_end)), leg)
-            exponent = dr.fma(sign, camera, at_lowest) + r * (leg * dr.rcp(whole))
+                segment = dr.fma(layer.sigma_t, medium._column(layer, lower, part, (here, at_end)), segment)
+            exponent = dr.fma(sign, camera, at_lowest) + r * (segment * dr.rcp(whole))
             value = weight * inverse * density * exp_bounded(-exponent)
             if not medium.phase.constant:
                 value *= medium.phase.evaluate_half(square_n * inverse, square_d * inverse)
             if self.light.varies:
                 value *= self.geometry.falloff_beside(self.light, (square_n - square_d) * scale)
             total += value
-        return dr.select(x1 > x0, total * share, 0), after
+        return dr.select(x1 > x0, total * fraction, 0), after
 
 
 def _roots(s, h):

@@ -254,7 +254,7 @@ class LightPaths:
         return dr.select(meets, w + r * rising, 0), (0.5 / rising if w else Float(dr.inf))
 
     def _smooth_chord(self, x):
-        """Return the length in which q^2 changes by a share of it: q is a root of it [m].
+        """Return the length in which q^2 changes by a fraction of it: q is a root of it [m].
 
         With f = |p x M|^2/|D|^2 it is R^2 - f, and over a length t f changes by
 

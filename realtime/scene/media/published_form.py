@@ -18,7 +18,7 @@ sigma_t h, b = sigma_t R and the angle theta at the light,
 * printed, the coefficients of the medium without bounds, c_n(sigma_t, h), become c_n(sigma_t, R).
 
 A kernel that has this form carries it as its attribute `bounded`, which `bounded_by` gives it. Other kernels leave
-bounded media to nodes, with the true depth of both legs.
+bounded media to nodes, with the true depth of both segments.
 """
 
 from collections.abc import Callable
@@ -40,7 +40,7 @@ class ConstantLeg:
 def bounded_by(bounded: Callable[..., Any]) -> Callable[[Any], Any]:
     """Return a decorator that gives a kernel its form for bounded media.
 
-    That is a function ``bounded(geometry, x0, x1, light, phase, leg, **parameters) -> J [1/m]`` with `leg` a
+    That is a function ``bounded(geometry, x0, x1, light, phase, segment, **parameters) -> J [1/m]`` with `segment` a
     `ConstantLeg` and the parameters of the kernel; `x0` and `x1` bound a segment of any length [m].
     """
 
@@ -58,8 +58,8 @@ def bounded_form(kernel: Any) -> Callable[..., Any] | None:
     known = {name: value for name, value in parameters.items() if name != "tables"}
     if bounded is None:
         return None
-    return lambda geometry, x0, x1, light, phase, leg: bounded(
-        geometry, x0, x1, light, phase, ConstantLeg(*leg), **known
+    return lambda geometry, x0, x1, light, phase, segment: bounded(
+        geometry, x0, x1, light, phase, ConstantLeg(*segment), **known
     )
 
 

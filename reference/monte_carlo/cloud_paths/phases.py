@@ -76,8 +76,8 @@ class Tabulated:
     def __init__(self, values: Array):
         self._last = len(values) - 1
         self._values = mi.Float(values)
-        share, other = _aliases(0.5 * (values[1:] + values[:-1]))
-        self._share, self._other = mi.Float(share), mi.UInt32(other)
+        fraction, other = _aliases(0.5 * (values[1:] + values[:-1]))
+        self._fraction, self._other = mi.Float(fraction), mi.UInt32(other)
 
     def value(self, down, up):
         """Return p."""
@@ -89,30 +89,30 @@ class Tabulated:
     def down(self, sampler, active):
         """Return sin^2 of half a random scattering angle."""
         number = dr.minimum(mi.UInt32(sampler.next_1d(active) * self._last), self._last - 1)
-        own = sampler.next_1d(active) < dr.gather(mi.Float, self._share, number, active)
+        own = sampler.next_1d(active) < dr.gather(mi.Float, self._fraction, number, active)
         cell = dr.select(own, number, dr.gather(mi.UInt32, self._other, number, active))
         low = dr.gather(mi.Float, self._values, cell, active)
         high = dr.gather(mi.Float, self._values, cell + 1, active)
         u = sampler.next_1d(active)
         root = dr.sqrt(dr.lerp(dr.square(low), dr.square(high), u))
-        share = u * (low + high) / dr.maximum(low + root, dr.smallest(mi.Float))
-        return dr.clip((self._last - cell - share) / self._last, 0.0, 1.0)
+        fraction = u * (low + high) / dr.maximum(low + root, dr.smallest(mi.Float))
+        return dr.clip((self._last - cell - fraction) / self._last, 0.0, 1.0)
 
 
 def _aliases(weights: Array) -> tuple[Array, NDArray[np.uint32]]:
-    """Return for each cell the share of its draws that stay with it, and the cell that gets the others."""
+    """Return for each cell the fraction of its draws that stay with it, and the cell that gets the others."""
     count = len(weights)
-    share = weights * (count / weights.sum())
+    fraction = weights * (count / weights.sum())
     other = np.arange(count, dtype=np.uint32)
-    small, large = list(np.flatnonzero(share < 1)), list(np.flatnonzero(share >= 1))
+    small, large = list(np.flatnonzero(fraction < 1)), list(np.flatnonzero(fraction >= 1))
     while small and large:
         low, high = small.pop(), large[-1]
         other[low] = high
-        share[high] -= 1 - share[low]
-        if share[high] < 1:
+        fraction[high] -= 1 - fraction[low]
+        if fraction[high] < 1:
             small.append(large.pop())
-    share[small + large] = 1.0
-    return share, other
+    fraction[small + large] = 1.0
+    return fraction, other
 
 
 def walk_phase(phase: PhaseFunction) -> WalkPhase:

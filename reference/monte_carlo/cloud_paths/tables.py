@@ -132,9 +132,9 @@ def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
     functions = list(dict.fromkeys(each.phase for each in clouds.clouds))
     power = np.array([sun.irradiance.sum() for sun in clouds.suns])
     suns = []
-    for sun, share in zip(clouds.suns, power / power.sum() if len(power) else [], strict=True):
-        if share > 0:
-            suns.append((_numbers(-sun.direction), _numbers(sun.irradiance / share), float(share)))
+    for sun, fraction in zip(clouds.suns, power / power.sum() if len(power) else [], strict=True):
+        if fraction > 0:
+            suns.append((_numbers(-sun.direction), _numbers(sun.irradiance / fraction), float(fraction)))
     reach = max(np.abs(np.array(clouds.scene.bbox().min)).max(), np.abs(np.array(clouds.scene.bbox().max)).max())
     return WalkScene(
         scene=clouds.scene,

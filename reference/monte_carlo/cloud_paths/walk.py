@@ -18,17 +18,17 @@ not scattered (the first, and the one after a surface) has no side flight before
 
 Paths are never cut short in clouds: absorption is a weight. Where a weight falls below 0.05, by absorption or by dark
 surfaces, the path goes on with a probability in proportion (Russian roulette, unbiased). A shadow ray that leaves a
-cloud with less than 1/8 of its light likewise goes on with 8 times that share as its probability.
+cloud with less than 1/8 of its light likewise goes on with 8 times that fraction as its probability.
 
 In which medium a stretch lies follows from its end: before a face of a cloud seen from inside, the cloud; before one
 seen from outside, or nothing, vacuum; before an opaque surface, where the path was last. So a crossing that rounding
-doubles or hides mends itself at the next face. After a crossing a ray starts a little further on, which is added to the
-length of its next stretch.
+doubles or hides repairs itself at the next face. After a crossing a ray starts a little further on, which is added to
+the length of its next stretch.
 
-A cloud with a density has its largest extinction for `sigma_t`, and the share rho of it at each place. Flights go as if
-it had the largest everywhere, and where one ends it is scattered with the probability rho, otherwise it flies on (delta
-tracking, Woodcock 1965). A shadow ray has such flights too, and goes on with the factor 1 - rho where one ends (ratio
-tracking, Novak, Selle, Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn again.
+A cloud with a density has its largest extinction for `sigma_t`, and the fraction rho of it at each place. Flights go as
+if it had the largest everywhere, and where one ends it is scattered with the probability rho, otherwise it flies on
+(delta tracking, Woodcock 1965). A shadow ray has such flights too, and goes on with the factor 1 - rho where one ends
+(ratio tracking, Novak, Selle, Jarosz 2014), or by the roulette above. Each flight casts the ray of its turn again.
 
 A lane of the loop follows the samples of one pixel one after another, so that lanes end at nearly the same time.
 """
@@ -44,7 +44,7 @@ from reference.monte_carlo.cloud_paths.tables import WalkScene
 
 MAIN, SIDE, SHADOW, SIDE_SHADOW, SURFACE_SHADOW = range(5)  #: what the ray of a lane is
 _LEAST_WEIGHT = 0.05
-_SHADOW_SHARE = 8.0
+_SHADOW_FRACTION = 8.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Paths:
     weight: Any  #: of the path, a colour
     order: Any  #: how many times it was scattered
     bounces: Any  #: how many surfaces it met
-    share: Any  #: of the sun's light at the end of this flight that counts
+    fraction: Any  #: of the sun's light at the end of this flight that counts
     value: Any  #: light at the start of a shadow ray
     target: Any  #: its layer
     left: Any  #: paths to follow, this one among them
@@ -116,7 +116,7 @@ def walk(scene: WalkScene, targets: Targets, sampler, rays, *, samples: int, sid
         weight=mi.Color3f(1),
         order=mi.UInt32(0),
         bounces=mi.UInt32(0),
-        share=mi.Float(1),
+        fraction=mi.Float(1),
         value=mi.Color3f(0),
         target=mi.UInt32(0),
         left=mi.UInt32(samples),
@@ -137,7 +137,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     flags = int(mi.RayFlags.All) if scene.has_surfaces else int(mi.RayFlags.Minimal)
     mode, o, d, gap, depth, medium = paths.mode, paths.o, paths.d, paths.gap, paths.depth, paths.medium
     x, w, cloud, weight, order = paths.x, paths.w, paths.cloud, paths.weight, paths.order
-    bounces, share, value, target = paths.bounces, paths.share, paths.value, paths.target
+    bounces, fraction, value, target = paths.bounces, paths.fraction, paths.value, paths.target
     si = scene.scene.ray_intersect(mi.Ray3f(o, d), flags, False, active)
     hit = active & si.is_valid()
     kind = dr.gather(mi.UInt32, scene.kinds, dr.reinterpret_array(mi.UInt32, si.shape), hit)
@@ -173,7 +173,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     place = target * lanes + lane
     for number in range(3):
         dr.scatter_add(sums[number], arriving[number], place, arrives, mode=dr.ReduceMode.NoConflicts)
-    chance = dr.minimum(_SHADOW_SHARE * lit, 1.0)
+    chance = dr.minimum(_SHADOW_FRACTION * lit, 1.0)
     fades = dims & (sampler.next_1d(active) >= chance)
     value = dr.select(dims, arriving / dr.maximum(chance, dr.smallest(mi.Float)), value)
     depth = dr.select(dims, 0.0, depth)
@@ -194,7 +194,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
             dr.scatter_add(sums[number], from_sky[number], place, of_sky, mode=dr.ReduceMode.NoConflicts)
     sun = scene.random_sun(sampler, active)
     to_sun, irradiance = scene.to_sun(sun), scene.irradiance(sun)
-    weighed = dr.select(begins, weight, weight * albedo) * share
+    weighed = dr.select(begins, weight, weight * albedo) * fraction
     scattered = weighed * scene.phase_value(within, d, to_sun, scatters) * irradiance
     value = dr.select(scatters, scattered, value)
     of_order = dr.select(begins, order, order + 1)
@@ -226,8 +226,8 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     new = scene.scattered(cloud, about, sampler, resumes | turns_aside)
     of_path = scene.phase_value(cloud, w, new, resumes | turns_aside)
     of_suns = scene.phase_about_suns(cloud, new, resumes | turns_aside)
-    share = dr.select(resumes | turns_aside, of_path / (of_path + side * of_suns), share)
-    share = dr.select(reflected, 1.0, share)
+    fraction = dr.select(resumes | turns_aside, of_path / (of_path + side * of_suns), fraction)
+    fraction = dr.select(reflected, 1.0, fraction)
 
     # Light paths' weights fall by absorption and at surfaces alone.
     survival = dr.minimum(dr.max(weight) / _LEAST_WEIGHT, 1.0)
@@ -259,7 +259,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
     mode = dr.select(resumes_any | over, MAIN, next_mode)
     weight = dr.select(over, 1.0, weight)
     order, bounces = dr.select(over, 0, order), dr.select(over, 0, bounces)
-    share = dr.select(over, 1.0, share)
+    fraction = dr.select(over, 1.0, fraction)
     following = Paths(
         mode,
         o,
@@ -273,7 +273,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
         weight,
         order,
         bounces,
-        share,
+        fraction,
         value,
         target,
         left=dr.select(over, paths.left - 1, paths.left),

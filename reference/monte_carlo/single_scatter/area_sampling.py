@@ -19,8 +19,8 @@ With an area of rho d(rho) d(phi) (Archimedes: equal slices have equal areas, an
 
 A ray may meet a sphere twice: each of both places has a quarter of the points. On a mesh half of the points are spread
 so in the one triangle that the ray meets first, if any, and the others evenly over all triangles. The density of a
-point is the mean over the techniques, each with its share (the balance heuristic with one sample, Veach 1997, section
-9.2.4).
+point is the mean over the techniques, each with its fraction (the balance heuristic with one sample, Veach 1997,
+section 9.2.4).
 
 References
 ----------
@@ -75,7 +75,7 @@ class _Mesh:
     scene: Any  #: an `mi.Scene` of the shape alone
     corners: Any  #: a corner, and the ways from it to both others [m]
     normals: Any  #: unit vectors to the side that shines
-    below: Any  #: the share of the area of all triangles up to each, itself included
+    below: Any  #: the fraction of the area of all triangles up to each, itself included
     count: int  #: how many there are
     area: float  #: of all [m^2]
 
@@ -238,12 +238,12 @@ def _on_plane(u, v, light: AreaLight, origin, direction) -> LightSample:
     else:
         inward = dr.minimum(1, a / dr.maximum(dr.hypot(x0, y0), _LEAST))
         x0, y0 = x0 * inward, y0 * inward
-    share = _share(light.centre + light.across * x0 + light.up * y0, light, origin, direction)
+    fraction = _fraction(light.centre + light.across * x0 + light.up * y0, light, origin, direction)
 
-    about = v < share
-    x, y = _even_in_plane(u, (v - share) / (1 - share), light)
+    about = v < fraction
+    x, y = _even_in_plane(u, (v - fraction) / (1 - fraction), light)
     sine, cosine = dr.sincos(2 * math.pi * u)
-    distance = _edge(x0, y0, cosine, sine, light) * (v / share)
+    distance = _edge(x0, y0, cosine, sine, light) * (v / fraction)
     x, y = dr.select(about, x0 + distance * cosine, x), dr.select(about, y0 + distance * sine, y)
     rho = dr.hypot(x - x0, y - y0)
     # From a place on the edge the light does not reach outwards at all: what is drawn there is the place itself.
@@ -251,7 +251,7 @@ def _on_plane(u, v, light: AreaLight, origin, direction) -> LightSample:
     rho = dr.select(counts, rho, 1)
     edge = _edge(x0, y0, (x - x0) / rho, (y - y0) / rho, light)
     # What rounding puts a little beyond the edge is at the edge.
-    density = (1 - share) / light.area + share / (2 * math.pi * dr.maximum(edge, rho) * rho)
+    density = (1 - fraction) / light.area + fraction / (2 * math.pi * dr.maximum(edge, rho) * rho)
     density = dr.select(counts, density, 0)
     return LightSample(light.centre + light.across * x + light.up * y, light.normal, density)
 
@@ -266,9 +266,9 @@ def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightSample:
     hit = mesh.scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)))
     meets = hit.is_valid()
     met = dr.select(meets, hit.prim_index, 0)
-    share = mi.Float64(dr.select(meets, 0.5, 0))
+    fraction = mi.Float64(dr.select(meets, 0.5, 0))
     number, within = mesh.choose(u)
-    even = _even_in_triangle(within, (v - share) / (1 - share), mesh, number)
+    even = _even_in_triangle(within, (v - fraction) / (1 - fraction), mesh, number)
 
     # The place in the triangle that was met, in the axes of its first side and across it.
     corner, first, second, normal = (*(mesh.corner(met, which) for which in range(3)), mesh.normal(met))
@@ -280,8 +280,8 @@ def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightSample:
     ends = [corner, corner + first, corner + second]
     sine, cosine = dr.sincos(2 * math.pi * u)
     edge = _edge_of_triangle(place, across * cosine + up * sine, ends, normal)
-    about = meets & (v < share)
-    position = dr.select(about, place + (across * cosine + up * sine) * (edge * v / dr.maximum(share, _LEAST)), even)
+    about = meets & (v < fraction)
+    position = dr.select(about, place + (across * cosine + up * sine) * (edge * v / dr.maximum(fraction, _LEAST)), even)
     number = dr.select(about, met, number)
 
     way = position - place
@@ -290,8 +290,8 @@ def _on_mesh(u, v, mesh: _Mesh, origin, direction) -> LightSample:
     counts = ~here | (rho > _TOUCHING * dr.norm(first))
     rho = dr.select(here & counts, rho, 1)
     edge = _edge_of_triangle(place, way / rho, ends, normal)
-    pdf = (1 - share) / mesh.area
-    pdf += dr.select(here, share / (2 * math.pi * dr.maximum(edge, rho) * rho), 0)
+    pdf = (1 - fraction) / mesh.area
+    pdf += dr.select(here, fraction / (2 * math.pi * dr.maximum(edge, rho) * rho), 0)
     return LightSample(position, mesh.normal(number), dr.select(counts, pdf, 0))
 
 
@@ -307,8 +307,8 @@ def _edge_of_triangle(place, towards, ends, normal):
     return reach
 
 
-def _share(place, light: AreaLight, origin, direction):
-    """Return the share of the points about a place of a light: a half where the ray meets it, few where it is far."""
+def _fraction(place, light: AreaLight, origin, direction):
+    """Return the fraction of points about a place of a light: a half where the ray meets it, few where it is far."""
     offset = place - origin
     gap = dr.norm(offset - direction * dr.dot(offset, direction)) / max(light.reach)
     return 0.5 / (1 + _FADE * gap * gap)
@@ -336,18 +336,18 @@ def _on_sphere(u, v, light: AreaLight, origin, direction) -> LightSample:
     # A ray that misses the sphere comes nearest to it in one place.
     middle = side * dr.minimum(height, radius)
     places = [dr.normalize(middle + direction * (sign * half)) for sign in (-1, 1)]
-    share = _share(light.centre + radius * places[0], light, origin, direction)
+    fraction = _fraction(light.centre + radius * places[0], light, origin, direction)
 
     angle = 2 * math.pi * u
-    normal = _towards(2 * dr.sqrt(dr.clip((v - share) / (1 - share), 0, 1)) - 1, angle, side)
+    normal = _towards(2 * dr.sqrt(dr.clip((v - fraction) / (1 - fraction), 0, 1)) - 1, angle, side)
     for number, place in enumerate(places):
-        chord = dr.clip(2 * v / share - number, 0, 1)  # over the diameter
-        chosen = (v < share) & ((v < 0.5 * share) == (number == 0))
+        chord = dr.clip(2 * v / fraction - number, 0, 1)  # over the diameter
+        chosen = (v < fraction) & ((v < 0.5 * fraction) == (number == 0))
         normal = dr.select(chosen, _towards(1 - 2 * chord * chord, angle, place), normal)
-    density = (1 - share) * (1 + dr.dot(normal, side)) / light.area
+    density = (1 - fraction) * (1 + dr.dot(normal, side)) / light.area
     for place in places:
         chord = dr.maximum(radius * dr.norm(normal - place), _LEAST)
-        density = density + 0.5 * share / (4 * math.pi * radius * chord)
+        density = density + 0.5 * fraction / (4 * math.pi * radius * chord)
     return LightSample(light.centre + normal * radius, normal, density)
 
 

@@ -3,9 +3,9 @@
 
 A bounded medium is a closed shape with the material `null` that names the media on both sides; it neither reflects nor
 refracts. A ray is followed from one such boundary to the next with `ray_intersect`, and the media are the scene's own
-pointers. A boundary that rounding makes a ray meet twice names the same medium both times. A boundary that a leg misses
-close to its end, where the point lies in or just beneath it, costs a stretch as short as that: the walk knows the
-medium from the light on and never asks in which medium the point may lie.
+pointers. A boundary that rounding makes a ray meet twice names the same medium both times. A boundary that a segment
+misses close to its end, where the point lies in or just beneath it, costs a stretch as short as that: the walk knows
+the medium from the light on and never asks in which medium the point may lie.
 
 Stretches are measured along the one straight ray, from the light to the point. A continued ray starts a little beyond a
 boundary, so that it does not meet it again; the optical depth counts that little way too. Visibility rays stop a
@@ -35,11 +35,11 @@ class Surroundings:
 
 
 @dataclass(frozen=True)
-class Leg:
-    """The media at the ends of legs from a light to points."""
+class Segment:
+    """The media at the ends of segments from a light to points."""
 
     start: Any  #: pointer to the medium at the light; what is beyond, the boundaries say
-    end_sigma_t: Any  #: extinction at the points [1/m], that of the whole leg where nothing bounds a medium
+    end_sigma_t: Any  #: extinction at the points [1/m], that of the whole segment where nothing bounds a medium
 
 
 def read_surroundings(scene) -> tuple[Surroundings, list[Any]]:
@@ -130,7 +130,7 @@ def medium_at(around: Surroundings, position, known_position, known_medium, acti
     return dr.while_loop(state, lambda walking, *_: walking, walk, label="medium at a light")[-1]
 
 
-def transmittance(around: Surroundings, start, direction, distance, *, media: Leg, active):
+def transmittance(around: Surroundings, start, direction, distance, *, media: Segment, active):
     """Return the transmittance from a light to points at a distance; 0 where something is in between.
 
     `around`: what rays can meet; `start`, `direction`, `distance`: the light, the unit vector to the point, and how far
@@ -163,7 +163,7 @@ def transmittance(around: Surroundings, start, direction, distance, *, media: Le
     zero = dr.zeros(mi.Float, dr.width(distance))
     medium = dr.select(active, media.start, dr.zeros(mi.MediumPtr))
     state = (mi.Bool(active), mi.Bool(active), zero, mi.Float(zero), medium, dr.zeros(mi.Spectrum, dr.width(distance)))
-    final = dr.while_loop(state, lambda walking, *_: walking, walk, label="leg through media")
+    final = dr.while_loop(state, lambda walking, *_: walking, walk, label="segment through media")
     _, lit, _, boundary, medium, depth = final
     _, sigma_t = coefficients(medium, lit)
     return dr.select(lit, dr.exp(-depth - sigma_t * (distance - boundary)), 0)

@@ -28,9 +28,10 @@ finite for every ray that does not meet the light: f r^2 is bounded (by sigma_s 
 whatever the free-flight density and whatever channel f is of.
 
 Nothing falls with the distance to a light from infinity: what varies along a stretch of length d is exp(-sigma y) of
-the camera ray, the transmittance of the leg, which may fall or rise, and shadows. There the density is the mean of the
-uniform one, 1/d, and of free flights. Half of the unit interval goes to the former, half to the latter: with n samples
-in n cells either technique is stratified by itself. As the density is nowhere below 1/(2 d), the estimator is bounded.
+the camera ray, the transmittance of the segment, which may fall or rise, and shadows. There the density is the mean of
+the uniform one, 1/d, and of free flights. Half of the unit interval goes to the former, half to the latter: with n
+samples in n cells either technique is stratified by itself. As the density is nowhere below 1/(2 d), the estimator is
+bounded.
 
 References
 ----------
@@ -212,9 +213,9 @@ def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
     """Return what equi-angular sampling and free flights add to the distribution function and to the density."""
     h, s = mixture.span.height, mixture.span.start + y
     flights = [_flight_cdf_and_pdf(y, flight) for flight in mixture.flights]
-    share = 0.5 / len(flights)
+    fraction = 0.5 / len(flights)
     equi = 0.5 * _angle(y, mixture.span) / mixture.range, 0.5 * h / (mixture.range * (h * h + s * s))
-    return [equi, (share * sum(cdf for cdf, _ in flights), share * sum(pdf for _, pdf in flights))]
+    return [equi, (fraction * sum(cdf for cdf, _ in flights), fraction * sum(pdf for _, pdf in flights))]
 
 
 def sample_distance(u, mixture: Mixture) -> tuple[Any, Any, Any]:
@@ -263,10 +264,10 @@ def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:
     """
     u, length = mi.Float64(u), mi.Float64(length)
     flights = [free_flights(length, mi.Float64(rate)) for rate in sigma_t]
-    share = 0.5 / len(flights)
+    fraction = 0.5 / len(flights)
     y = 2 * u * length
     for number, flight in enumerate(flights):
-        low = 0.5 + number * share
-        y = dr.select(u >= low, free_flight(dr.clip((u - low) / share, 0, 1), flight), y)
+        low = 0.5 + number * fraction
+        y = dr.select(u >= low, free_flight(dr.clip((u - low) / fraction, 0, 1), flight), y)
     y = dr.minimum(y, length)
-    return y, 0.5 / length + share * sum(free_flight_pdf(y, flight) for flight in flights)
+    return y, 0.5 / length + fraction * sum(free_flight_pdf(y, flight) for flight in flights)

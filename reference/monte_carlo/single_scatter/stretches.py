@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import drjit as dr
 import mitsuba as mi
 
-from reference.monte_carlo.single_scatter.boundary_walk import Leg, Surroundings, medium_at, transmittance
+from reference.monte_carlo.single_scatter.boundary_walk import Segment, Surroundings, medium_at, transmittance
 from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_of, sample_distance, sample_stretch
 
 _STEPS = (0.7548776662466927, 0.5698402909980532)  # 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly
@@ -98,9 +98,9 @@ class Stretch(Part):
             at_light = dr.zeros(mi.MediumPtr)  # beyond all shapes is vacuum
         elif at_light is None:
             at_light = medium_at(self.around, path.begin, ray.origin, self.at_camera, active)
-        media = Leg(at_light, self.sigma_t)
-        leg = transmittance(self.around, path.begin, path.away, path.length, media=media, active=active)
-        return leg * dr.exp(-self.depth - self.sigma_t * mi.Float(x - self.start)), sampler
+        media = Segment(at_light, self.sigma_t)
+        segment = transmittance(self.around, path.begin, path.away, path.length, media=media, active=active)
+        return segment * dr.exp(-self.depth - self.sigma_t * mi.Float(x - self.start)), sampler
 
 
 def double_ray(origin, direction) -> Ray:
@@ -111,7 +111,7 @@ def double_ray(origin, direction) -> Ray:
 
 def lit(around: Surroundings, path: Path, active):
     """Return 1 where nothing stands in paths, 0 elsewhere."""
-    nothing = Leg(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
+    nothing = Segment(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
     return transmittance(around, *path.shadow_ray(), media=nothing, active=active)
 
 

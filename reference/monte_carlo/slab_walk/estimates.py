@@ -94,22 +94,22 @@ def slab_estimate(
                 progress((number + 1) / batches, f"{sum(sizes[: number + 1])} photons")
     # (batches, .., sets, 3)
     reflected, transmitted, up, down, fluence = (np.stack(each) for each in zip(*done, strict=True))
-    share = np.array(sizes) / photons
+    fraction = np.array(sizes) / photons
     beam, pi = slab.mu0, math.pi
     return SlabEstimate(
         photons=photons,
         sets=tuple(
             SetEstimate(
-                reflected=_exit(reflected[:, place], share),
-                transmitted=_exit(transmitted[:, place], share),
-                fluence=tuple(_exit(beam * fluence[:, depth, place], share) for depth in range(len(slab.depths))),
+                reflected=_exit(reflected[:, place], fraction),
+                transmitted=_exit(transmitted[:, place], fraction),
+                fluence=tuple(_exit(beam * fluence[:, depth, place], fraction) for depth in range(len(slab.depths))),
             )
             for place in range(len(sets))
         ),
-        reflectance=_amount(reflected[:, -2, 0], share),
-        transmittance=_amount(transmitted[:, -2, 0], share),
-        up=tuple(_amount(pi * beam * up[:, depth, -1, 0], share) for depth in range(len(slab.depths))),
-        down=tuple(_amount(pi * beam * down[:, depth, -1, 0], share) for depth in range(len(slab.depths))),
+        reflectance=_amount(reflected[:, -2, 0], fraction),
+        transmittance=_amount(transmitted[:, -2, 0], fraction),
+        up=tuple(_amount(pi * beam * up[:, depth, -1, 0], fraction) for depth in range(len(slab.depths))),
+        down=tuple(_amount(pi * beam * down[:, depth, -1, 0], fraction) for depth in range(len(slab.depths))),
     )
 
 
@@ -129,33 +129,35 @@ def _by_set(counts: Counts, ranges: Sequence[tuple[int, float]]) -> tuple[Array,
     )
 
 
-def _amount(batches: Array, share: Array) -> Estimate:
-    """Return the mean over batches, weighted with their share of the photons, and its standard error."""
-    mean = float(share @ batches)
-    return Estimate(mean, _standard_error(batches - mean, share))
+def _amount(batches: Array, fraction: Array) -> Estimate:
+    """Return the mean over batches, weighted with their fraction of the photons, and its standard error."""
+    mean = float(fraction @ batches)
+    return Estimate(mean, _standard_error(batches - mean, fraction))
 
 
-def _standard_error(residuals: Array, share: Array) -> float | None:
+def _standard_error(residuals: Array, fraction: Array) -> float | None:
     count = residuals.size
-    return math.sqrt(float((share * residuals) @ (share * residuals)) * count / (count - 1)) if count > 1 else None
+    return (
+        math.sqrt(float((fraction * residuals) @ (fraction * residuals)) * count / (count - 1)) if count > 1 else None
+    )
 
 
-def _exit(batches: Array, share: Array) -> ExitEstimate:
+def _exit(batches: Array, fraction: Array) -> ExitEstimate:
     """Return amount, mean and rms of (batches, 3) moments; ratios by the delta method.
 
     The errors of ratios need light in several batches: below `_FEWEST` there is none to tell.
     """
-    amount, first, second = share @ batches
+    amount, first, second = fraction @ batches
     if amount <= 0.0:
-        return ExitEstimate(_amount(batches[:, 0], share), Estimate(None, None), Estimate(None, None))
+        return ExitEstimate(_amount(batches[:, 0], fraction), Estimate(None, None), Estimate(None, None))
     mean, square = first / amount, second / amount
     rms = math.sqrt(square)
     if np.count_nonzero(batches[:, 0]) < _FEWEST:
-        return ExitEstimate(_amount(batches[:, 0], share), Estimate(float(mean), None), Estimate(rms, None))
-    mean_error = _standard_error((batches[:, 1] - mean * batches[:, 0]) / amount, share)
-    square_error = _standard_error((batches[:, 2] - square * batches[:, 0]) / amount, share)
+        return ExitEstimate(_amount(batches[:, 0], fraction), Estimate(float(mean), None), Estimate(rms, None))
+    mean_error = _standard_error((batches[:, 1] - mean * batches[:, 0]) / amount, fraction)
+    square_error = _standard_error((batches[:, 2] - square * batches[:, 0]) / amount, fraction)
     return ExitEstimate(
-        _amount(batches[:, 0], share),
+        _amount(batches[:, 0], fraction),
         Estimate(float(mean), mean_error),
         Estimate(rms, square_error / (2 * rms) if square_error is not None and rms > 0 else square_error),
     )

@@ -41,8 +41,8 @@ class Tabulated:
 
     def __init__(self, angles: Array, heights: Array):
         parts = max(1, _CELLS // (angles.size - 1))
-        share = np.arange(parts) / parts
-        fine = np.append((angles[:-1, None] + np.diff(angles)[:, None] * share).reshape(-1), angles[-1])
+        fraction = np.arange(parts) / parts
+        fine = np.append((angles[:-1, None] + np.diff(angles)[:, None] * fraction).reshape(-1), angles[-1])
         height = np.interp(fine, angles, heights)
         self._cosines = np.cos(fine)
         # Cosines as 1 - 2 sin^2 keep the width of the cells near forward.

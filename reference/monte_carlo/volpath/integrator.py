@@ -16,7 +16,8 @@ it out, and what the light's own shape does stays: a black one ends camera rays,
 integrator `direct` looks through both). Part of such light comes by rays that the phase function or a surface sends on,
 with a weight; these are not shortened, so the shadow-ray epsilon counts in part. The fluence of such a light is at most
 2 pi times its radiance, and so the variance is bounded. Past the boundary of a medium, a shadow ray starts further on
-than the epsilon of a short leg and meets a black light itself: within about 0.3 m of bounds, black lights are too dim.
+than the epsilon of a short segment and meets a black light itself: within about 0.3 m of bounds, black lights are too
+dim.
 
 Each batch has its own seed and at most 256 samples a pixel on the average; what a pixel gets may differ, see
 `reference.monte_carlo.allocation`. Sums, means and standard errors are taken in float64.

@@ -62,7 +62,7 @@ _DISTANCE = 17  # digits of a distance that is written
 _CONVENTIONS = {
     "radiance": "airlight: light scattered exactly once in the medium, RGB [W/(m^2 sr)]",
     "bound": "largest absolute error of each radiance",
-    "distance": "to the first occluder along the ray [m]; inf: none, the ray is endless",
+    "distance": "to the first occluder along the ray [m]; inf: none, the ray is unbounded",
     "lit": "for each light, where the lit intervals of the ray begin and end [m]",
     "pixels": "rays through the pixel centres, row by row from the top left",
     "phase": "its mean over the sphere is 1; with c the cosine of the scattering angle, +1 forward: isotropic 1; "

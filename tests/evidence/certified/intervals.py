@@ -121,7 +121,7 @@ def spot_cones(light: FogLight) -> list[tuple[Vector, Number]]:
 
 
 def _crossed(shape: Occluder, start: Vector, step: Vector, longest: Number) -> tuple[Number, Number] | None:
-    """Return the shares of `step` between which the line is in a shape.
+    """Return the fractions of `step` between which the line is in a shape.
 
     None unless it enters between 0 and `longest`: both ends of the segment are outside of the shape.
     """

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from realtime.clouds.bounds import cloud_surfaces, next_crossing
-from realtime.clouds.march import depths_along, leg_through
+from realtime.clouds.march import depths_along, segment_through
 from realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_as_printed, opacity_of
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
@@ -49,7 +49,7 @@ def test_depths_in_a_ring_are_those_of_all_its_triangles(precision, end):
 
 
 def test_points_on_the_boundary_are_neither_lost_nor_counted_twice():
-    """Legs start where camera rays enter and leave: towards the inside the whole chord counts, away from it nothing."""
+    """Segments start where camera rays enter and leave: inwards the whole chord counts, outwards nothing."""
     read = read_scene(loaded())
     surfaces = cloud_surfaces(read)
     origin, direction = random_rays(2000, seed=11)
@@ -93,7 +93,7 @@ def rays(count=60):
     return origin, direction
 
 
-def legs(points):
+def segments(points):
     """Return lengths in the ring from points towards the sun [m]: where it leaves less where it enters."""
     vertices, faces = ring()
     a, b, c = np.moveaxis(vertices.astype(np.float32).astype(np.float64)[faces], 1, 0)
@@ -116,9 +116,9 @@ def summed_up(origin, direction, scale=1.0, steps=200):
     for begin, end in zip(np.append(0.0, distance)[:-1][leaves], distance[leaves]):
         width = (end - begin) / steps
         middle = begin + (np.arange(steps) + 0.5) * width
-        leg = legs(origin + middle[:, None] * direction)
+        segment = segments(origin + middle[:, None] * direction)
         path = before + middle - begin
-        depth = SIGMA * (path + scale * leg)[:, None]
+        depth = SIGMA * (path + scale * segment)[:, None]
         total += (ALBEDO * SIGMA * np.exp(-depth)).sum(axis=0) * width
         before += end - begin
     return total / (4 * np.pi)
@@ -132,9 +132,9 @@ def marched(scene, origin, direction, *, steps, scales=(1.0,), printed=False):
     read = read_scene(scene)
     surfaces, clouds = cloud_surfaces(read), read.medium.clouds
     path = cloud_rays(surfaces, clouds, device(origin), device(direction), mi.Float(dr.inf), stride=None)
-    leg = leg_through(surfaces, clouds, read.lights[0], stride=None)
+    segment = segment_through(surfaces, clouds, read.lights[0], stride=None)
     ones = tuple((mi.Float(1),) for _ in scales)
-    beam = Beam(mi.Color3f(1), tuple(mi.Float(scale) for scale in scales), ones, leg, None)
+    beam = Beam(mi.Color3f(1), tuple(mi.Float(scale) for scale in scales), ones, segment, None)
     (octaves,) = light_once(path, [beam], steps=steps, stride=1, printed=printed)
     dr.eval(octaves)
     return [np.array(octave, dtype=np.float64).T for octave in octaves]
@@ -167,8 +167,8 @@ def test_opacity_is_one_less_the_transmittance():
     surfaces = cloud_surfaces(read)
     found = opacity(surfaces, read.medium.clouds, device(origin), device(direction), mi.Float(470.0))
     length = np.array([length_inside(ring(), *ray, 470.0) for ray in zip(origin, direction)])
-    share = np.array(found).T
-    assert share == pytest.approx(1 - np.exp(-SIGMA * length[:, None]), rel=1e-3, abs=1e-5)
+    fraction = np.array(found).T
+    assert fraction == pytest.approx(1 - np.exp(-SIGMA * length[:, None]), rel=1e-3, abs=1e-5)
 
 
 @pytest.mark.claim("cloud-printed-equations")
@@ -184,5 +184,5 @@ def test_equations_as_printed_have_the_wrong_sign(few):
     surfaces = cloud_surfaces(read)
     length = np.array(opacity_as_printed(surfaces, read.medium.clouds, *path, stride=1)).T
     one_stretch = [len(crossings(ring(), *ray)[0]) <= 2 for ray in zip(origin, direction)]
-    share = np.array(opacity(surfaces, read.medium.clouds, *path)).T
-    assert length[one_stretch] == pytest.approx(-share[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)
+    fraction = np.array(opacity(surfaces, read.medium.clouds, *path)).T
+    assert length[one_stretch] == pytest.approx(-fraction[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)

@@ -16,7 +16,7 @@ from realtime.clouds.bounds import cloud_surfaces
 from realtime.clouds.collector_search import Search
 from realtime.clouds.light_depths import light_depths
 from realtime.clouds.lit_surface import dense_surface
-from realtime.clouds.march import depths_along, leg_through
+from realtime.clouds.march import depths_along, segment_through
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene
@@ -149,15 +149,19 @@ def test_finer_grids_of_a_smooth_field_converge(name, monkeypatch):
     assert steps[2] < 0.02
 
 
-@pytest.mark.claim("hypertexture-legs", tolerance="0.05 of depth in the mean, of legs of 2.5: 256 texels, 64 layers")
-def test_the_map_of_a_sun_holds_the_depths_of_legs():
+@pytest.mark.claim(
+    "hypertexture-segments", tolerance="0.05 of depth in the mean, of segments of 2.5: 256 texels, 64 layers"
+)
+def test_the_map_of_a_sun_holds_the_depths_of_segments():
     """In and between the limbs of the ring, where the map must know the gap."""
     read = read_scene(uneven())
     surfaces, clouds, light = cloud_surfaces(read), read.medium.clouds, read.lights[0]
     random = np.random.default_rng(3)
     points = mi.Vector3f(*(aligned_array(mi.Float, column) for column in random.uniform(LOW, HIGH, (4000, 3)).T))
     stride = dr.opaque(mi.Float, 0.25)
-    (expected,) = (np.array(leg) for leg in leg_through(surfaces, clouds, light, stride=stride)(points, True))
+    (expected,) = (
+        np.array(segment) for segment in segment_through(surfaces, clouds, light, stride=stride)(points, True)
+    )
     found = (
         0.0363 * waves(13).max() * np.array(light_depths(surfaces, clouds, light, cloud=0, stride=stride).at(points))
     )

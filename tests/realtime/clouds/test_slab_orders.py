@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: radiance by sets of orders is that of photons and sums to DISORT's, and shares of a uniform sky add up."""
+"""Claim: radiance by sets of orders is that of photons and sums to DISORT's, and fractions of a uniform sky add up."""
 
 import math
 import warnings
@@ -252,8 +252,8 @@ def test_shares_are_those_of_photons():
         orders[inside] += 1
         mu[inside] = random.uniform(-1, 1, inside.sum())
     scattered = orders[orders > 0]
-    shares = slab_escapes(tau, HenyeyGreensteinPhase(0.0), 1.0)[-1]
+    fractions = slab_escapes(tau, HenyeyGreensteinPhase(0.0), 1.0)[-1]
     firsts = [1, 2, 3, 5, 7, 9, 13]
     counted = np.histogram(scattered, bins=[*firsts, np.inf])[0] / len(scattered)
     error = 4 * np.sqrt(counted / len(scattered))
-    assert np.all(np.abs(counted[:-1] - shares[:6]) < error[:-1] + 1e-4)
+    assert np.all(np.abs(counted[:-1] - fractions[:6]) < error[:-1] + 1e-4)

@@ -111,7 +111,7 @@ def pattern(kind, *, run=0, frame=0, golden=False, size=64):
     return found if many else found.reshape(size, size)
 
 
-def low_share(values):
+def low_fraction(values):
     """Return the mean of the spectrum below an eighth of a cycle per pixel; 1 for white noise."""
     power = np.abs(np.fft.fft2(values - values.mean())) ** 2 / values.size / values.var()
     frequency = np.hypot(*np.meshgrid(*(np.fft.fftfreq(side) for side in values.shape), indexing="ij"))
@@ -119,7 +119,7 @@ def low_share(values):
 
 
 @pytest.mark.claim(
-    "noise-patterns", tolerance="Kolmogorov and Smirnov at 1e-4; low share of the spectrum below 0.1 if blue"
+    "noise-patterns", tolerance="Kolmogorov and Smirnov at 1e-4; low fraction of the spectrum below 0.1 if blue"
 )
 def test_patterns_are_even_over_the_runs_and_in_the_image(variant):
     for kind in PATTERNS:
@@ -129,8 +129,8 @@ def test_patterns_are_even_over_the_runs_and_in_the_image(variant):
         assert np.mean(one != later) > 0.99
         moved = pattern(kind, frame=3, golden=True) - one
         np.testing.assert_allclose(moved % 1, 3 * (np.sqrt(5) - 1) / 2 % 1, atol=2**-22)
-    assert low_share(pattern("white")) > 0.8
-    assert low_share(pattern("blue")) < 0.1
+    assert low_fraction(pattern("white")) > 0.8
+    assert low_fraction(pattern("blue")) < 0.1
     nine = np.array([np.roll(pattern("ign"), (i, j), (0, 1)) for i in range(3) for j in range(3)])[:, 2:, 2:]
     # The nine of any 3 x 3 pixels lie about evenly: the widest gap between white ones is 0.31 in the mean.
     gaps = np.diff(np.sort(nine, axis=0), axis=0, append=np.sort(nine, axis=0)[:1] + 1)
@@ -171,8 +171,8 @@ def frames(method, steps, *, run=0, **parameters):
     return np.array(images, dtype=np.float64)
 
 
-def darker(now, share):
-    return replace(now, lights=tuple(replace(light, intensity=light.intensity * share) for light in now.lights))
+def darker(now, fraction):
+    return replace(now, lights=tuple(replace(light, intensity=light.intensity * fraction) for light in now.lights))
 
 
 def shifted_camera(now, vector):
@@ -273,7 +273,7 @@ def test_history_has_a_name_and_refuses_parameters_of_its_own_names():
 
     @dataclass(frozen=True)
     class Taken(Speckle):
-        alpha: float = parameter(0.5, "a share")
+        alpha: float = parameter(0.5, "a fraction")
 
     with pytest.raises(InputError, match=r"speckle\+history: the method has a parameter 'alpha'"):
         with_history(Taken)

@@ -64,7 +64,7 @@ def cube_of_fog() -> Scene:
     )
 
 
-def frames(scene: Scene, steps, share: float = 0.1):
+def frames(scene: Scene, steps, fraction: float = 0.1):
     """Yield the scene after each step, and what moved."""
     objects = read_objects(scene, closed_shapes(read_occluders(scene.geometry))) if "objects" in steps else None
     turn = np.eye(3)
@@ -77,7 +77,7 @@ def frames(scene: Scene, steps, share: float = 0.1):
         elif step == "medium":
             scene = replace(scene, medium=thicker_medium(scene.medium, 1.3))
         elif step == "colour":
-            scene = replace(scene, lights=tuple(coloured_light(light, share) for light in scene.lights))
+            scene = replace(scene, lights=tuple(coloured_light(light, fraction) for light in scene.lights))
         elif step == "camera":
             scene = replace(scene, camera=aside(scene.camera))
             moved["camera_moved"] = True

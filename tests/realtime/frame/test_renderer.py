@@ -104,14 +104,14 @@ def test_the_mean_converges_to_that_over_the_pixels(variant):
     loaded = load_scene("sphere-spot", (16, 12))
     reference = reference_image(loaded.scene, pixel="area").airlight
     renderer = prepared(read_scene(loaded.scene), configuration("shadow-planes"))
-    shares = []
+    fractions = []
 
     def error(samples):
-        frame = render_samples(renderer, samples, shares.append)
+        frame = render_samples(renderer, samples, fractions.append)
         return np.sqrt(np.mean((frame.airlight - reference) ** 2)) / reference.mean()
 
     assert error(16) < error(1) / 4
-    assert shares == [number / 16 for number in range(1, 17)]
+    assert fractions == [number / 16 for number in range(1, 17)]
 
 
 # Lights on rays, by their distance -----------------------------------------------------------------------------------

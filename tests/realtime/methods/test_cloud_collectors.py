@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.canonical.coordinates import share_of_peak
+from realtime.clouds.canonical.coordinates import fraction_of_peak
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame, render_frame
 from realtime.methods.registry import METHODS
@@ -112,9 +112,9 @@ def test_coloured_clouds_are_three_grey_ones(variant):
 
 
 def test_the_peak_lowers_the_density(variant):
-    """The share of the peak is what the slab loses in thickness; the printed half is more."""
-    share = share_of_peak(HenyeyGreenstein(mi.Float(0.85)), array_types("single"))
-    thin = _slab(medium=DROPLETS | {"sigma_t": (1 - share) * EXTINCTION})
+    """The fraction of the peak is what the slab loses in thickness; the printed half is more."""
+    fraction = fraction_of_peak(HenyeyGreenstein(mi.Float(0.85)), array_types("single"))
+    thin = _slab(medium=DROPLETS | {"sigma_t": (1 - fraction) * EXTINCTION})
     matched = _airlight(_scene(), peak="matched")
     np.testing.assert_allclose(matched, _airlight(_scene(sun=_sun(ALONG), slab=thin)), rtol=1e-3, atol=1e-6)
     assert _airlight(_scene(), peak="half").mean() < 0.95 * matched.mean()
@@ -162,15 +162,15 @@ def test_another_cloud_in_the_light_dims_and_changes_no_thickness(variant):
     far = cloud("far", placed(box((300.0, 300.0, side)), tuple(MIDDLE - 900.0 * ALONG), TURN))
     alone = _airlight(_scene(sun=_sun(ALONG), slab=_slab()), map=1024)
     both = _airlight(_scene(sun=_sun(ALONG), slab=_slab(), far=far), map=1024)
-    share = both / np.maximum(alone, 1e-9)
+    fraction = both / np.maximum(alone, 1e-9)
     faded = np.exp(-EXTINCTION * side / -(ALONG @ normal))
-    assert share.max() < 1.01
-    assert np.mean(np.abs(share - faded) < 0.01) > 0.1  # in the middle of the shade
-    assert np.mean(np.abs(share - 1) < 0.01) > 0.2  # beside it
-    assert share[alone > 0].min() > 0.98 * faded
+    assert fraction.max() < 1.01
+    assert np.mean(np.abs(fraction - faded) < 0.01) > 0.1  # in the middle of the shade
+    assert np.mean(np.abs(fraction - 1) < 0.01) > 0.2  # beside it
+    assert fraction[alone > 0].min() > 0.98 * faded
 
 
-@pytest.mark.claim("uniform-sky-total", tolerance="1e-3: the shares of a slab add up to 1, in float32")
+@pytest.mark.claim("uniform-sky-total", tolerance="1e-3: the fractions of a slab add up to 1, in float32")
 def test_of_a_uniform_sky_comes_as_much_as_clouds_take(variant):
     """A cloud that absorbs nothing cannot be told from the sky around it; layers add up, and order 1 is a part."""
     sky = {"type": "constant", "radiance": {"type": "rgb", "value": [0.11, 0.17, 0.31]}}

@@ -56,8 +56,8 @@ def test_octaves_in_a_slab_are_their_integrals(precision):
     for octave in range(3):
         a, b, g = 0.4**octave, 0.3**octave, 0.85 * 0.6**octave
         phase = (1 - g * g) / (1 + g * g - 2 * g * cosine) ** 1.5
-        share = mu0 / (mu0 + a * mu) * (1 - np.exp(-tau * (1 / mu + a / mu0)))
-        expected.append(np.array([3.1, 2.9, 2.3]) * b * phase / (4 * np.pi) * share)
+        fraction = mu0 / (mu0 + a * mu) * (1 - np.exp(-tau * (1 / mu + a / mu0)))
+        expected.append(np.array([3.1, 2.9, 2.3]) * b * phase / (4 * np.pi) * fraction)
     assert frame.airlight == pytest.approx(sum(expected), rel=5e-4)
     assert list(frame.extra) == ["airlight_1", "airlight_2", "airlight_3_4", OPACITY]
     for name, octave in zip(frame.extra, expected):

@@ -63,7 +63,7 @@ def test_a_frame_is_composed_by_the_formula(scene):
             return Layers(type(view.medium.albedo)(0), tuple(True for _ in view.lights))
 
     plain = frame(scene, Nothing)
-    veiled = frame(scene, Veil, share=0.3, veil=0.6)
+    veiled = frame(scene, Veil, fraction=0.3, veil=0.6)
     behind = np.where(np.isfinite(plain.distance)[..., None], 0, np.array([0.3, 0.4, 0.5]))
     assert np.max(plain.surface) > 0
     assert np.max(behind) > 0

@@ -20,8 +20,8 @@ def render(method, *, scene, precision="double", **parameters):
 def lit_by_hand(points, light, centre, radius):
     """Return whether no ball lies between points and the light, by the distance of its centre from the segment."""
     way = light - points
-    share = np.clip(np.sum((centre - points) * way, axis=-1) / np.sum(way * way, axis=-1), 0, 1)
-    return np.linalg.norm(points + share[..., None] * way - centre, axis=-1) > radius
+    fraction = np.clip(np.sum((centre - points) * way, axis=-1) / np.sum(way * way, axis=-1), 0, 1)
+    return np.linalg.norm(points + fraction[..., None] * way - centre, axis=-1) > radius
 
 
 def runs_by_hand(scene, distance, steps, spacing):

@@ -18,7 +18,7 @@ from tests.helpers.lamps import lamp_scene
         ("soft-shafts", {"interleave": True}, "interleave: got 5 points of a light, wanted 1, 2, 4, 8 or 16"),
         ("light-volumes", {"map": 500}, "map: got 500, wanted a power of two from 4 to 8192"),
         ("light-volumes", {"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*=mesh"),
-        ("shadow-planes", {"tolerance": 1.0}, "tolerance: got 1.0, wanted a share"),
+        ("shadow-planes", {"tolerance": 1.0}, "tolerance: got 1.0, wanted a fraction"),
         ("shadow-planes", {"tolerance": 0.01}, "got an image of 18 x 12, wanted sides that are multiples of 4"),
         ("shadow-planes", {"points": 0}, "points: got 0, wanted a whole number from 1 to 4096"),
         ("shadow-planes", {"pattern": "spiral"}, "pattern: got 'spiral', wanted one of ring, grid, sobol, interleaved"),

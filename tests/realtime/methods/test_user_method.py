@@ -99,7 +99,7 @@ def render(own, variant):
 def test_the_signature_decides(own):
     method = find_method(f"{own}:calls")
     assert method.uses_kernel
-    assert defaults(method) == {"steps": 7, "share": 0.5, "word": "a", "on": True}
+    assert defaults(method) == {"steps": 7, "fraction": 0.5, "word": "a", "on": True}
     assert (method.shadows, method.frozen, method.casts_rays) == (False, True, True)
     method = find_method(f"{own}:divides")
     assert not method.uses_kernel

@@ -26,7 +26,7 @@ POINTS = 4
 
 @pytest.fixture(scope="module")
 def empty(variant):
-    """A area light in fog, and nothing else."""
+    """An area light in fog, and nothing else."""
     return read_scene(mi.load_dict(tiny_scene(lamp=lamp(), ball=None, floor=None)))
 
 

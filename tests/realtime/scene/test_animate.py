@@ -32,7 +32,7 @@ def leaves(light) -> dict[str, np.ndarray]:
 
 
 def in_sun_and_sky(turn: float, colour: list[float]):
-    """The scene with a light of each kind, read anew with all of them turned and coloured; a sky does not turn."""
+    """The scene with a light of each kind, read again with all of them turned and coloured; a sky does not turn."""
 
     def world(first, second):
         about = mi.ScalarTransform4f().translate([0.1, 0.2, 0]).rotate([0, 0, 1], turn).translate([-0.1, -0.2, 0])
@@ -59,7 +59,7 @@ def in_sun_and_sky(turn: float, colour: list[float]):
     return [light for scene in built for light in read_scene(scene).lights]
 
 
-def test_moved_lights_of_every_kind_are_those_of_the_scene_read_anew(variant):
+def test_moved_lights_of_every_kind_are_those_of_the_scene_read_fresh(variant):
     colour = [3.0, 2.0, 0.5]
     before = in_sun_and_sky(0.0, colour)
     assert {light.kind for light in before} == {"point", "spot", "directional"}
@@ -67,9 +67,9 @@ def test_moved_lights_of_every_kind_are_those_of_the_scene_read_anew(variant):
     turned, coloured = in_sun_and_sky(71.0, colour), in_sun_and_sky(0.0, [0.5, 3.0, 2.0])
     for old, after, other in zip(before, turned, coloured, strict=True):
         by_turn = leaves(turned_light(old, np.array([0.1, 0.2, 0.0]), rotation((0, 0, 1), 71.0)))
-        for moved, anew in ((by_turn, leaves(after)), (leaves(coloured_light(old, 1 / 3)), leaves(other))):
-            assert moved.keys() == anew.keys()
-            for name, values in anew.items():
+        for moved, fresh in ((by_turn, leaves(after)), (leaves(coloured_light(old, 1 / 3)), leaves(other))):
+            assert moved.keys() == fresh.keys()
+            for name, values in fresh.items():
                 if not name.endswith("_low"):  # what float32 took from the other part, which may round the other way
                     # float32, and Mitsuba's matrices, which have a few roundings of their own.
                     np.testing.assert_allclose(

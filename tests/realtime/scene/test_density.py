@@ -42,7 +42,7 @@ def test_a_grid_is_linear_between_its_voxels(precision):
 
 
 def test_a_turned_grid_far_away():
-    """The transform comes from words of six digits and a box: right to a share of the grid, wherever that is."""
+    """The transform comes from words of six digits and a box: right to a fraction of the grid, wherever that is."""
     middle = np.array([71_903.0, -51_307.0, 31_711.0])
     turn = (
         mi.ScalarTransform4f()
@@ -57,12 +57,12 @@ def test_a_turned_grid_far_away():
     shape = cloud("ring", (vertices + middle, faces), medium)
     scene = mi.load_dict(cloud_scene(sun=SUN, ring=shape, origin=tuple(middle + np.array([30.8, -400.9, 57.0]))))
     density = read_scene(scene, "double").medium.clouds.density
-    share = RANDOM.random((300, 3))
+    fraction = RANDOM.random((300, 3))
     matrix = np.array(to_world.matrix, dtype=np.float64).reshape(4, 4)
-    points = share @ matrix[:3, :3].T + matrix[:3, 3]
+    points = fraction @ matrix[:3, :3].T + matrix[:3, 3]
     found = np.array(density.at(mi.Vector3d(points.T), mi.UInt32(0)))
     # Mitsuba's box in float32 is right to 0.004 m of 50 m wide voxels here.
-    np.testing.assert_allclose(found, linear_between(ROUGH, np.zeros(3), np.ones(3), share) / ROUGH.max(), atol=5e-4)
+    np.testing.assert_allclose(found, linear_between(ROUGH, np.zeros(3), np.ones(3), fraction) / ROUGH.max(), atol=5e-4)
 
 
 NEGATIVE = ROUGH.copy()

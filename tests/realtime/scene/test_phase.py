@@ -7,7 +7,7 @@ import pytest
 
 from analytic.droplets import Droplets, Modified, optics
 from analytic.phase import PhaseFunction, phase_from_words
-from realtime.droplets import droplet_series, share_cut
+from realtime.droplets import droplet_series, fraction_cut
 from realtime.errors import InputError
 from realtime.scene.phase import named_phase
 
@@ -63,8 +63,10 @@ def test_two_routes_give_one_phase_function(droplets):
     assert series.values(angle) == pytest.approx(reference.series(np.cos(angle)), rel=1e-7)
     assert series.efficiency == pytest.approx(reference.q_extinction, rel=1e-10)
     assert series.extinction_per_droplet * 1e-12 * droplets.number == pytest.approx(reference.extinction, rel=1e-10)
-    assert series.share_below(np.deg2rad(5)) == pytest.approx(reference.share(0, 5), abs=1e-9)
-    assert share_cut(droplets.effective_radius, droplets.gamma) == pytest.approx(Modified(reference).removed, abs=1e-9)
+    assert series.fraction_below(np.deg2rad(5)) == pytest.approx(reference.fraction(0, 5), abs=1e-9)
+    assert fraction_cut(droplets.effective_radius, droplets.gamma) == pytest.approx(
+        Modified(reference).removed, abs=1e-9
+    )
 
 
 @pytest.mark.claim("droplets-refused")

@@ -129,7 +129,7 @@ def test_rows_and_columns_are_those_of_a_division(variant, width):
 
 
 def test_one_kernel_serves_images_of_all_sizes(variant):
-    """Rationale: a kernel that holds the size of an image is compiled anew for each, for half a second and more."""
+    """Rationale: a kernel that holds the size of an image is compiled again for each, for half a second and more."""
     launched = []
     for size in ((64, 48), (96, 80)):
         scene = read_scene(load_scene("sphere-spot", size).scene)

@@ -178,6 +178,6 @@ def test_density_of_points_on_a_light(variant, kind):
             worth = np.divide(1, density, out=np.zeros(count), where=density > 0)
             for part in (lambda place: place @ across > -9, lambda place: (place @ across > 0.05) & (place @ up < 0.1)):
                 inside = part(np.array(point.position).T - centre)
-                share = float(part(np.array(even.position).T - centre).mean())
-                error = (worth * inside).std() / np.sqrt(count) + 2e-3 * light.area * (share < 1)
-                assert abs((worth * inside).mean() - share * light.area) < 4 * error + 1e-9
+                fraction = float(part(np.array(even.position).T - centre).mean())
+                error = (worth * inside).std() / np.sqrt(count) + 2e-3 * light.area * (fraction < 1)
+                assert abs((worth * inside).mean() - fraction * light.area) < 4 * error + 1e-9

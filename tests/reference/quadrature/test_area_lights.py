@@ -98,12 +98,12 @@ def test_a_mesh_of_a_quad_is_the_rectangle_and_of_a_sphere_the_sphere(variant):
     for mesh, light in ((placed(quad, (0.3, 0.4, 2.9), turn), flat()), (fine, ball())):
         one, other = room(mesh_lamp(mesh)), room(light)
         images = [quadrature_image(reference, plan=fixed(64)) for reference in (one, other)]
-        share = one.area[0].area / other.area[0].area
+        fraction = one.area[0].area / other.area[0].area
         for layer in ("airlight", "surface"):
             found, wanted = (getattr(image, layer) for image in images)
             error = np.hypot(*(getattr(image, f"{layer}_se") for image in images))
             assert np.sqrt(np.mean(error**2)) < 4e-2 * wanted.mean()
-            assert np.all(np.abs(found - share * wanted) < 7 * error + 1e-3 * wanted + 1e-12)
+            assert np.all(np.abs(found - fraction * wanted) < 7 * error + 1e-3 * wanted + 1e-12)
 
 
 def test_one_sample_by_plain_quadrature(variant):
@@ -212,8 +212,8 @@ def test_surfaces_by_many_shadow_rays(variant, kind):
             end = np.broadcast_to(sample.position + 1e-6 * sample.axis, start.shape)
             seen = ~segments_blocked(start, end, shapes) & (np.sum(way * normal, axis=1) > 0)
             sent = np.maximum(-way @ sample.axis, 0) / r**2 * seen
-            leg = np.exp(-np.outer(r + hits.distance[rows], reference.medium.sigma_t))
-            expected[..., replicate] += reflection(rows, way) * sent[:, None] * leg * sample.intensity / count
+            segment = np.exp(-np.outer(r + hits.distance[rows], reference.medium.sigma_t))
+            expected[..., replicate] += reflection(rows, way) * sent[:, None] * segment * sample.intensity / count
     assert 0.1 < np.mean(lit[rows, 0].mean(axis=1) > 0) < 1
     difference = lit[rows].mean(axis=2) - expected.mean(axis=2)
     error = np.hypot(standard_error(lit[rows]), standard_error(expected))

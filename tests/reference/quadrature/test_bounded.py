@@ -105,8 +105,8 @@ def test_airlight_is_the_sum_over_small_steps(variant, case):
     "lit-surface", tolerance="1e-6 relative; 2e-5 under a sun: float32 hits the sphere at grazing angles"
 )
 @pytest.mark.parametrize("light", ["lamp", "sun"])
-def test_surfaces_are_darkened_by_both_legs(variant, light):
-    """A lamp or a sun above the sphere: the floor below it is darker by the chord of the leg and of the view."""
+def test_surfaces_are_darkened_by_both_segments(variant, light):
+    """A lamp or a sun above the sphere: the floor below it is darker by the chord of the segment and of the view."""
     changes = {"floor": tiny_scene()["floor"]}
     above = tiny_scene()["lamp"] | {"position": [0.6, 0.4, 2.3]}
 
@@ -121,9 +121,9 @@ def test_surfaces_are_darkened_by_both_legs(variant, light):
     if light == "sun":
         towards, length = np.broadcast_to(-reference.directional[0].direction, point.shape), np.inf
     else:
-        leg = reference.lights[0].position - point
-        length = np.linalg.norm(leg, axis=1)
-        towards = leg / length[:, None]
+        segment = reference.lights[0].position - point
+        length = np.linalg.norm(segment, axis=1)
+        towards = segment / length[:, None]
     depth = np.zeros(len(point))
     for origin, direction, end in (
         (reference.origin, reference.direction[hit], distance[hit]),
@@ -174,8 +174,8 @@ def test_ray_through_a_lamp(variant):
 def test_ray_through_a_box_in_closed_form(variant, way):
     """Light that falls on the box's upper face, along the ray's own direction, and against it.
 
-    From above: the leg of depth z below the upper face; along the ray both depths add up to that of the chord, or the
-    leg is as long as the way of the view.
+    From above: the segment of depth z below the upper face; along the ray both depths add up to that of the chord, or
+    the segment is as long as the way of the view.
     """
 
     origin, direction = np.array([-0.5, -2.0, 0.71875]), np.array([0.0, 1.0, 0.0])
@@ -189,7 +189,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     if way == "across":
         above = BRICK[0][2] + BRICK[1][2] - origin[2]
         integral = np.exp(-sigma_t * above) * (1 - np.exp(-sigma_t * length)) / sigma_t
-    elif way == "with the ray":  # the leg goes back to the face at which the ray came in
+    elif way == "with the ray":  # the segment goes back to the face at which the ray came in
         integral = (1 - np.exp(-2 * sigma_t * length)) / (2 * sigma_t)
     else:
         integral = np.exp(-sigma_t * length) * length
@@ -201,7 +201,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
 
 
 def test_shadow_of_a_sphere_in_fog(variant):
-    """A sphere between sun and box: points by the distance of its centre from their legs, and the plain sum."""
+    """A sphere between sun and box: points by the distance of its centre from their segments, and the plain sum."""
     centre, radius = np.array([-0.71875, 0.25, 1.21875]), 0.1875
     occluder = {"type": "sphere", "center": centre.tolist(), "radius": radius}
     reference, image = reference_and_image(sunny(brick=brick(), occluder=occluder))

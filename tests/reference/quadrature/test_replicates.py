@@ -35,7 +35,7 @@ def test_intervals_of_independent_points_hold():
 
     means, counts = replicate_means(rays, np.zeros((rays, 3)), PointPlan(), sums)
     held = np.abs(means.mean(axis=2) - 1) <= STUDENT * standard_error(means)
-    # Four standard errors of a share of 40 000 tries: 4 sqrt(0.95 0.05/40 000) = 0.44 %.
+    # Four standard errors of a fraction of 40 000 tries: 4 sqrt(0.95 0.05/40 000) = 0.44 %.
     assert held.mean(axis=0) == pytest.approx(0.95, abs=4.4e-3)
     # Where points were chosen, neither the fewest nor the most, too.
     chosen = (counts > 16) & (counts < 1024)
@@ -68,8 +68,8 @@ def test_points_follow_the_error_that_is_asked_for():
 RUNS = 400
 
 
-def share_held(replicates_of, expected, doubt=0.0):
-    """Return how many intervals hold of each value, and of all together with the error of that share."""
+def fraction_held(replicates_of, expected, doubt=0.0):
+    """Return how many intervals hold of each value, and of all together with the error of that fraction."""
     held = []
     for seed in range(RUNS):
         replicates = replicates_of(PointPlan(seed=seed))
@@ -80,14 +80,14 @@ def share_held(replicates_of, expected, doubt=0.0):
     return held.mean(axis=0), held.mean(), held.mean(axis=1).std() / np.sqrt(RUNS)
 
 
-def check_shares(each, all_of_them, error):
+def check_fractions(each, all_of_them, error):
     # One value: 400 tries with a probability of 0.95, 4.5 standard errors of 1.1 %.
     assert each.min() >= 0.95 - 4.5 * np.sqrt(0.95 * 0.05 / RUNS)
     assert all_of_them == pytest.approx(0.95, abs=0.01 + 2 * error)
 
 
 @pytest.mark.statistical
-@pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a share of 400 runs, 1 % of all")
+@pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a fraction of 400 runs, 1 % of all")
 def test_intervals_beside_a_lamp_hold(variant):
     sigma_t, radius, far = 0.21, 0.3, 2.0
     reference = lit_room(lamp("sphere", center=[0.0, 0.0, far], radius=radius), medium=fog(sigma_t, 1.0), empty=True)
@@ -103,11 +103,11 @@ def test_intervals_beside_a_lamp_hold(variant):
     )
     closed = [sphere_airlight(sigma_t, h, radius, foot=f, x0=0.0, x1=5.0) for h, f in zip(height, foot, strict=True)]
     expected = np.array(closed) * sigma_t / (4 * np.pi)
-    check_shares(*share_held(lambda plan: airlight_replicates(rays, plan, np.full(3, 5.0))[:, 0], expected))
+    check_fractions(*fraction_held(lambda plan: airlight_replicates(rays, plan, np.full(3, 5.0))[:, 0], expected))
 
 
 @pytest.mark.statistical
-@pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a share of 400 runs, 1 % of all")
+@pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a fraction of 400 runs, 1 % of all")
 @pytest.mark.parametrize("layer", ["airlight", "surface"])
 @pytest.mark.parametrize("before", ["block", "blinds"])
 def test_intervals_in_a_penumbra_hold(variant, layer, before):
@@ -133,5 +133,5 @@ def test_intervals_in_a_penumbra_hold(variant, layer, before):
     fine = replicates(fixed(8192, seed=RUNS))
     lit = fine.mean(axis=1) > 0
     assert lit.sum() >= 5
-    found = share_held(lambda plan: replicates(plan)[lit], fine[lit].mean(axis=1), standard_error(fine[lit]))
-    check_shares(*found)
+    found = fraction_held(lambda plan: replicates(plan)[lit], fine[lit].mean(axis=1), standard_error(fine[lit]))
+    check_fractions(*found)

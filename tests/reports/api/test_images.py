@@ -88,7 +88,7 @@ def test_a_function_of_ones_own_is_a_method(variant):
 def test_the_reference_with_its_bound(variant, own_cache):
     told = []
     scene = airlight.load_scene("sphere-spot", TINY)
-    reference = airlight.reference(scene, progress=lambda share, what: told.append((share, what)))
+    reference = airlight.reference(scene, progress=lambda fraction, what: told.append((fraction, what)))
     np.testing.assert_array_equal(reference.airlight, reference_image(scene.scene).airlight)
     assert reference.bound.shape == reference.airlight.shape == (12, 16, 3)
     assert reference.airlight.dtype == np.float64

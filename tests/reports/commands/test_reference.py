@@ -101,8 +101,8 @@ def test_a_stopped_run_goes_on_and_a_damaged_block_is_traced_again(traced, tmp_p
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
-    mended = summary(tmp_path / "b.exr", capfd, "--samples", "64")
-    assert (mended["cached"], mended["damaged"]) == (24, 1)
+    repaired = summary(tmp_path / "b.exr", capfd, "--samples", "64")
+    assert (repaired["cached"], repaired["damaged"]) == (24, 1)
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 

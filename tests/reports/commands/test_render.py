@@ -78,6 +78,6 @@ def test_plan_counts_occluders_and_warns_of_open_ones_where_planes_have_an_order
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "--set", "order=paper", "--plan", "--json")
     err = capfd.readouterr().err
     words = json.loads(out)["plan"]
-    assert words["casters"].startswith("2 shapes, 1090 triangles")
+    assert words["occluders"].startswith("2 shapes, 1090 triangles")
     assert "silhouette edges" in words["planes"]
     assert err.count("airlight: warning: shape 'floor' is open") == 1

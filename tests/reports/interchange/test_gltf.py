@@ -34,7 +34,7 @@ def parts(path):
 
 
 def project(document, points):
-    """Return where points of glTF's world are in the image, in shares of its width and height from the upper left."""
+    """Return where points of glTF's world are in the image, in fractions of its size from the upper left."""
     node = next(node for node in document["nodes"] if "camera" in node)
     lens = document["cameras"][node["camera"]]["perspective"]
     matrix = np.array(node["matrix"]).reshape(4, 4).T

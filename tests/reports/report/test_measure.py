@@ -66,7 +66,7 @@ def written(variant, tmp_path_factory, cache_of_module, monkeypatch_of_module):
         folder / "out" / "here",
         replace(TINY, scenes=(str(folder / "my <fog>.xml"),)),
         command="airlight report --tiny",
-        progress=lambda share, what: told.append((share, what)),
+        progress=lambda fraction, what: told.append((fraction, what)),
     )
     return SimpleNamespace(folder=folder / "out" / "here", report=report, data=as_json(report), told=told)
 
@@ -171,7 +171,7 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
 
 @pytest.mark.claim("report-kept")
 def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypatch, own_cache):
-    """In a cache of its own: what it finds anew replaces what was kept."""
+    """In a cache of its own: what it finds again replaces what was kept."""
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr("validation.study.scene.agreements", lambda scene, margins, **options: {})
     monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)

@@ -115,7 +115,7 @@ def test_noise_and_bias_of_methods_are_told_apart(variant, tmp_path):
     assert still["runs"] == 1
     assert still["variance"] == 0
     assert still["relative_rmse"] < 1e-5  # float32 beside the light
-    assert still["low_share"] is None
+    assert still["low_fraction"] is None
     # A number even in [0, 2] has the variance 1/3. All channels share it: values are a third as many.
     variance = np.mean(reference**2) / reference.mean() ** 2 / 3
     assert noisy["runs"] == runs

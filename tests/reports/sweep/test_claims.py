@@ -76,7 +76,7 @@ def test_a_scene_with_the_reference_of_one_medium_is_a_try(sweep_of):
 
 
 @pytest.mark.claim("sweep-properties")
-def test_planted_property_is_found_and_no_other(sweep_of):
+def test_injected_property_is_found_and_no_other(sweep_of):
     sweep = sweep_of(rows(200))
     made = samples(sweep)
     found = correlations(sweep, made)
@@ -144,7 +144,7 @@ def test_refusals_are_counted_by_reason(sweep_of):
 
 
 @pytest.mark.claim("sweep-faults")
-def test_planted_faults_are_found_and_counted(sweep_of):
+def test_injected_faults_are_found_and_counted(sweep_of):
     several = rows(20)
     several[7] |= {"error.nonfinite": 12}
     several[8] |= {"error.negative": 5}
@@ -192,7 +192,7 @@ def test_order_in_which_rows_were_finished_does_not_matter(tmp_path):
 
 @pytest.mark.claim("sweep-last-rows")
 def test_cells_that_were_computed_again_count_once(sweep_of):
-    """A fault that is mended is gone; a cell that was computed for its error and again for its time has both."""
+    """A fault that is repaired is gone; a cell that was computed for its error and again for its time has both."""
     old, new = (
         {"source": "old", "started": "2026-11-23T08:00:00Z"},
         {"source": "new", "started": "2026-11-23T09:00:00Z"},

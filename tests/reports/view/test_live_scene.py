@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A live scene shows what one made anew shows, bit by bit, and makes no more than it must; its pictures and errors."""
+"""A live scene shows what one made again shows, bit by bit, and makes no more than it must; its pictures and errors."""
 
 import drjit as dr
 import mitsuba as mi
@@ -36,7 +36,7 @@ def shown(scene):
     return frame.airlight, frame.surface, frame.distance
 
 
-def anew(scene):
+def made_again(scene):
     """The layers of the scene as a command would render it."""
     loaded = load_scene(scene.name, scene.size, scene.changes)
     frame = render_frame(prepared(read_scene(loaded.scene), scene.chosen))
@@ -65,7 +65,7 @@ def test_after_each_change_the_frame_is_that_of_a_scene_made_anew(name, method, 
     for move in moves:
         scene.change(move)
         frames.append(shown(scene))
-        for layer, fresh in zip(frames[-1], anew(scene), strict=True):
+        for layer, fresh in zip(frames[-1], made_again(scene), strict=True):
             np.testing.assert_array_equal(layer, fresh)
         assert not np.array_equal(frames[-1][0], frames[-2][0])
 
@@ -79,12 +79,12 @@ def test_camera_light_and_medium_record_nothing():
     scene.change(CAMERA)
     shown(scene)
     before = recordings(scene)
-    for share in (1.1, 1.2, 1.3):
-        scene.change({"camera.origin": tuple(share * value for value in CAMERA["camera.origin"])})
+    for fraction in (1.1, 1.2, 1.3):
+        scene.change({"camera.origin": tuple(fraction * value for value in CAMERA["camera.origin"])})
         shown(scene)
-        scene.change({"light.position": tuple(share * value for value in LIGHT["light.position"])})
+        scene.change({"light.position": tuple(fraction * value for value in LIGHT["light.position"])})
         shown(scene)
-        scene.change({"medium.sigma_t": (0.41 * share,)})
+        scene.change({"medium.sigma_t": (0.41 * fraction,)})
         shown(scene)
     assert recordings(scene) == before
 
@@ -103,7 +103,7 @@ def test_a_parameter_records_the_methods_stages_and_not_the_surface():
     assert scene.renderer is not first
     assert (after["surface"], after["shade"]) == (before["surface"], before["shade"])
     assert after["render"] == 1
-    for layer, fresh in zip(layers, anew(scene), strict=True):
+    for layer, fresh in zip(layers, made_again(scene), strict=True):
         np.testing.assert_array_equal(layer, fresh)
     scene.choose(configuration("ray-march", None, {"steps": 4}))
     shown(scene)

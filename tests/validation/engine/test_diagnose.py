@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Diagnoses name the fault that is planted, alone, with another, or none; also one in a renderer in NumPy."""
+"""Diagnoses name the fault that is injected, alone, with another, or none; also one in a renderer in NumPy."""
 
 import importlib
 import sys
@@ -14,7 +14,7 @@ from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from reference.storage.exr import Image
-from tests.helpers.planted_faults import PLANTED
+from tests.helpers.injected_faults import INJECTED
 from tests.helpers.scenes import FOG, scene_xml
 from validation.engine.diagnose import diagnose_image
 from validation.engine.evidence import is_noise
@@ -50,35 +50,35 @@ def reference(variant):
 FAST = ("extinction", "transfer")
 
 
-def marked(planted):
-    name = f"{planted.name}: {planted.words}"
-    return pytest.param(planted, id=name, marks=() if planted.name in FAST else pytest.mark.slow)
+def marked(injected):
+    name = f"{injected.name}: {injected.words}"
+    return pytest.param(injected, id=name, marks=() if injected.name in FAST else pytest.mark.slow)
 
 
-@pytest.mark.claim("diagnosis-planted")
-@pytest.mark.parametrize("planted", [marked(planted) for planted in PLANTED])
-def test_a_planted_fault_comes_first(reference, planted):
-    diagnosis = diagnosed(planted.image(reference))
-    assert diagnosis.first == planted.name, [row.words for row in diagnosis.ranked]
-    assert diagnosis.ranked[0].name == planted.name
+@pytest.mark.claim("diagnosis-injected")
+@pytest.mark.parametrize("injected", [marked(injected) for injected in INJECTED])
+def test_a_injected_fault_comes_first(reference, injected):
+    diagnosis = diagnosed(injected.image(reference))
+    assert diagnosis.first == injected.name, [row.words for row in diagnosis.ranked]
+    assert diagnosis.ranked[0].name == injected.name
     assert diagnosis.explained
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", ["the extinction 1.4 times", "upside down", "filmic", "half a pixel", "sRGB"])
-def test_a_planted_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(reference, words):
+def test_a_injected_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(reference, words):
     """The images of the test above have no noise, and it says that their pixels are centres: an engine says neither."""
-    (planted,) = (each for each in PLANTED if each.words == words)
+    (injected,) = (each for each in INJECTED if each.words == words)
     noise = 1 + 0.01 * np.random.default_rng(6).standard_normal((SIZE[1], SIZE[0], 1))
-    assert diagnosed(planted.image(reference) * noise, pixel=None).first == planted.name
+    assert diagnosed(injected.image(reference) * noise, pixel=None).first == injected.name
 
 
 @pytest.mark.slow
 def test_a_light_that_is_off_is_named_among_many_triangles(reference, monkeypatch):
     """There less is tried, since paths cost much."""
     monkeypatch.setattr("validation.engine.diagnose._MANY_TRIANGLES", 0)
-    (planted,) = (each for each in PLANTED if each.name == "light-position")
-    diagnosis = diagnosed(planted.image(reference))
+    (injected,) = (each for each in INJECTED if each.name == "light-position")
+    diagnosis = diagnosed(injected.image(reference))
     assert diagnosis.first == "light-position"
     assert diagnosis.explained
 
@@ -152,31 +152,31 @@ def scenes(variant, tmp_path_factory):
 
 
 def named(scenes, number, noise=0.01):
-    engine, planted, _, given = numpy_faults.CASES[number]
+    engine, injected, _, given = numpy_faults.CASES[number]
     loaded, light = scenes[engine]
     image = numpy_faults.rendered(replace(engine, **given), area=False, noise=noise, seed=number)
-    return planted, diagnose_image(Image({"total": image}), loaded, light=light)
+    return injected, diagnose_image(Image({"total": image}), loaded, light=light)
 
 
 @pytest.mark.slow
 @pytest.mark.claim("diagnosis-engines")
 @pytest.mark.parametrize("number", range(len(numpy_faults.CASES)))
 def test_what_is_set_wrong_in_an_engine_is_named_or_placed(scenes, number):
-    planted, said = named(scenes, number)
-    assert said.first == planted, [row.words for row in said.ranked]
-    assert said.place == "" or planted == "unexplained"
+    injected, said = named(scenes, number)
+    assert said.first == injected, [row.words for row in said.ranked]
+    assert said.place == "" or injected == "unexplained"
 
 
 @pytest.mark.claim("diagnosis-engines")
 def test_the_fog_alone_is_too_bright(scenes):
-    planted, said = named(scenes, 2)
-    assert said.first == planted == "fog-factor"
+    injected, said = named(scenes, 2)
+    assert said.first == injected == "fog-factor"
     assert said.ranked[0].parameter == pytest.approx(8.3, rel=1e-2)
     assert said.rest.startswith("noise")
     assert "which is noise" in "\n".join(said.lines)
 
 
-@pytest.mark.claim("diagnosis-planted")
+@pytest.mark.claim("diagnosis-injected")
 def test_values_that_few_pixels_have_cut_off_are_looked_at(variant):
     """Of 19 200 pixels 240 are at the largest value; 352 are looked at, and chance had two of the 240 among them."""
     scene = load_scene("open-fog", (160, 120)).scene

@@ -138,9 +138,9 @@ def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path,
     by_file = compare_images(read_exr(reference), read_exr(write(**image)), layer=layer, margin=0.01).statistics
     compared = compare_scene(path, write(**image), layer=layer, pixel="centre", margin=0.01)
     by_scene = compared.comparison.statistics
-    assert by_scene.reference_variance_share == pytest.approx(by_file.reference_variance_share, rel=1e-5)
+    assert by_scene.reference_variance_fraction == pytest.approx(by_file.reference_variance_fraction, rel=1e-5)
     assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
-    assert by_file.reference_variance_share > 0.9
+    assert by_file.reference_variance_fraction > 0.9
     assert compared.reference_error > expected.airlight_se.mean() / expected.airlight.mean()
 
 
@@ -235,7 +235,7 @@ FAULTS = {
 
 @pytest.mark.claim("engine-verdict")
 @pytest.mark.parametrize("fault", FAULTS)
-def test_planted_faults_are_not_called_right(traced, fault):
+def test_injected_faults_are_not_called_right(traced, fault):
     _, expected, image, _ = traced
     change, words = FAULTS[fault]
     judged = compared(traced, change(image, expected))
@@ -254,7 +254,7 @@ def test_the_place_of_the_error_is_that_of_the_worst_pixels():
     lamp[6:9, 10:13] = 1
     place = error_place(expected, image, lamp)
     assert (place.pixels, place.worst, place.kind, place.few) == (1, (11, 7), "lamp", True)
-    np.testing.assert_allclose(place.share, 9 / (9 + 0.0009), rtol=1e-12)
+    np.testing.assert_allclose(place.fraction, 9 / (9 + 0.0009), rtol=1e-12)
     np.testing.assert_allclose(place.relative_rmse_without, np.sqrt(0.0009 / 599), rtol=1e-12)
     assert "100 % of the squared error in 1 pixel (beside a light, in column 11, row 7)" in place.words
     assert error_place(expected, expected, lamp) is None

@@ -79,10 +79,10 @@ def test_reference_that_is_wrong_in_a_corner_is_rejected_there(scene, monkeypatc
 
 @pytest.mark.claim("corrected-for-the-epsilon")
 def test_correction_for_the_epsilon_is_the_difference_of_the_two_biases(scene):
-    """A light path that is shorter by a share s is brighter by s sigma_t <r>, <r> its mean length over the light.
+    """A light path that is shorter by a fraction s is brighter by s sigma_t <r>, <r> its mean length over the light.
 
-    The slope comes from a share of 1 %, whose square term is half of 0.01 sigma_t <r>, below 1 % of it. One bias over
-    the other is the ratio of the two references: no sample counts.
+    The slope comes from a fraction of 1 %, whose square term is half of 0.01 sigma_t <r>, below 1 % of it. One bias
+    over the other is the ratio of the two references: no sample counts.
     """
     plain, shorter = reference_image(scene), reference_image(scene, shadow_scale=0.99)
     masks = layer_masks(read_reference(scene), plain)

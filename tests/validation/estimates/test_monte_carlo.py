@@ -112,7 +112,7 @@ def test_an_interrupted_run_goes_on_where_it_stopped(scene, traced, stop):
 @pytest.mark.claim("damaged-cache")
 @pytest.mark.parametrize("damage", ["flipped byte", "truncated", "empty", "of another seed"])
 @pytest.mark.parametrize("name", ["000000-000007", "000009"])
-def test_damage_is_found_counted_and_mended(scene, traced, damage, name):
+def test_damage_is_found_counted_and_repaired(scene, traced, damage, name):
     whole = volpath(scene, batches=11)
     (folder,) = cache_folder().iterdir()
     path = folder / f"{name}.npz"
@@ -123,9 +123,9 @@ def test_damage_is_found_counted_and_mended(scene, traced, damage, name):
         volpath(scene, batches=8, first_seed=16)
         content = bytearray((folder / ("000016-000023.npz" if "-" in name else "000008.npz")).read_bytes())
     path.write_bytes(content[: {"truncated": len(content) // 3, "empty": 0}.get(damage, len(content))])
-    mended = volpath(scene, batches=11)
-    assert_same(mended.batches, whole.batches)
-    assert mended.damaged == 1
+    repaired = volpath(scene, batches=11)
+    assert_same(repaired.batches, whole.batches)
+    assert repaired.damaged == 1
     assert volpath(scene, batches=11).damaged == 0
 
 
@@ -328,11 +328,11 @@ def test_progress_shows_the_error_falling_to_its_target(loaded):
     assert reference.reached
     assert 100 < batches < 200
     assert batches % 8 == 0
-    shares = [share for share, _ in told]
-    assert shares[:8] == [0.0] * 8  # nothing is known of the error yet
-    # The share follows the estimate of the error, whose square is known to some 20 % by then.
-    assert shares[batches // 2] == pytest.approx(0.5, abs=0.15)
-    assert 0.85 < shares[-1] < 1
+    fractions = [fraction for fraction, _ in told]
+    assert fractions[:8] == [0.0] * 8  # nothing is known of the error yet
+    # The fraction follows the estimate of the error, whose square is known to some 20 % by then.
+    assert fractions[batches // 2] == pytest.approx(0.5, abs=0.15)
+    assert 0.85 < fractions[-1] < 1
     errors = [float(what.split()[5]) for _, what in told[8:]]
     assert errors[0] > 2 * errors[-1]
     assert told[-1][1].startswith(f"volpath, {batches} batches, pooled error 0.01")
@@ -349,7 +349,7 @@ def test_no_run_stops_on_a_target_before_its_error_is_known(loaded):
 def test_time_budget_never_starts_a_batch_that_would_end_too_late(loaded):
     reference, told = run(loaded, Budget(seconds=10.5))
     assert reference.image.attributes["airlight:batches"] == 10
-    assert [share for share, _ in told] == pytest.approx([n / 10.5 for n in range(1, 11)])
+    assert [fraction for fraction, _ in told] == pytest.approx([n / 10.5 for n in range(1, 11)])
     assert reference.reached is None
     again, told = run(loaded, Budget(seconds=3.2))
     # What is kept costs no time.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The share of multiple scattering."""
+"""The fraction of multiple scattering."""
 
 import mitsuba as mi
 import numpy as np
@@ -20,7 +20,7 @@ def layers(albedo, depth):
     return volpath_batch(read_reference(scene(albedo)), 3, 16, max_depth=depth).mean
 
 
-@pytest.mark.claim("left-out-share")
+@pytest.mark.claim("left-out-fraction")
 def test_the_nth_scattering_grows_with_the_nth_power_of_the_albedo(variant):
     """With the same seed the same paths are traced, so this holds path by path, to float32 rounding."""
     full = [layers(0.8, depth)[0] for depth in (2, 3, 4)]
@@ -38,13 +38,13 @@ def test_share_grows_with_the_optical_depth(variant):
     )
     assert 0 < thin.medium.value < 0.1 < thick.medium.value < 1
     assert thick.everything.value > 0
-    for share in (thin.medium, thick.medium, thick.everything):
-        low, high = share.interval
-        assert low < share.value < high
+    for fraction in (thin.medium, thick.medium, thick.everything):
+        low, high = fraction.interval
+        assert low < fraction.value < high
     assert (thin.batches, thin.samples, thin.max_depth) == (6, 8, 6)
 
 
-@pytest.mark.claim("left-out-share")
+@pytest.mark.claim("left-out-fraction")
 def test_the_interval_holds_the_share_in_95_of_100_runs():
     """Batches whose parts are correlated, as those of the same seeds are; the true share is 0.2.
 

@@ -40,7 +40,7 @@ def model_and_image(name):
 def test_radiance_is_that_of_the_reference(variant, name):
     reference, model, image = model_and_image(name)
     airlight, surface = model.layers(scene_fog(reference))
-    # Nodes err by 3e-8 a panel where the integrand is smooth, by 2e-5 where a leg grazes a sphere of medium.
+    # Nodes err by 3e-8 a panel where the integrand is smooth, by 2e-5 where a segment grazes a sphere of medium.
     error = relative(airlight, image.airlight.reshape(-1, 3))
     assert np.quantile(error, 0.99) < 1e-6
     assert error.max() < 5e-5
@@ -77,8 +77,8 @@ def test_laws_can_be_changed_one_by_one(variant):
 
     assert right[:, 0] == pytest.approx(summed(sigma_t * (nodes.x + nodes.r)), rel=1e-9)
     for law, wanted in (
-        ({"light_leg": (0.0, 0.0)}, summed(sigma_t * nodes.x)),
-        ({"camera_leg": (0.0, 0.0)}, summed(sigma_t * nodes.r)),
+        ({"light_segment": (0.0, 0.0)}, summed(sigma_t * nodes.x)),
+        ({"camera_segment": (0.0, 0.0)}, summed(sigma_t * nodes.r)),
         ({"planar": frozenset({"nodes"})}, summed(sigma_t * (nodes.x * (direction @ axis) + nodes.r))),
         ({"distance_power": 1.0}, summed(sigma_t * (nodes.x + nodes.r), 1.0)),
         ({"window": lambda r: np.exp(-r)}, summed(sigma_t * (nodes.x + nodes.r), factor=np.exp(-nodes.r))),

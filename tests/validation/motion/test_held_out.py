@@ -17,7 +17,7 @@ from validation.motion.blocks import Estimate
 from validation.motion.measures import Measures, Sequence, measure
 
 FRAMES, HEIGHT, WIDTH = 30, 29, 45
-WEIGHT, SIGMA, SHARE, AGE = 0.2, 0.08, 0.25, 4
+WEIGHT, SIGMA, FRACTION, AGE = 0.2, 0.08, 0.25, 4
 
 
 def wall() -> np.ndarray:
@@ -47,7 +47,7 @@ def late(frames: np.ndarray, by: int) -> np.ndarray:
 
 
 def left_behind() -> np.ndarray:
-    return LIGHT + SHARE * np.maximum(late(LIGHT, AGE) - LIGHT, 0)
+    return LIGHT + FRACTION * np.maximum(late(LIGHT, AGE) - LIGHT, 0)
 
 
 MADE = {
@@ -69,7 +69,7 @@ VALUES: list[tuple[str, Callable[[Measures], Estimate], float, float]] = [
     ("noise", lambda found: found.lag.gain, 0.97, 0.0),
     ("noise", lambda found: found.lag.lag, 0.0, 0.0),
     ("noise", lambda found: found.bias, -0.03, 0.0),
-    ("ghost", lambda found: found.ghost_by_age[AGE - 1], SHARE, 0.0),
+    ("ghost", lambda found: found.ghost_by_age[AGE - 1], FRACTION, 0.0),
     # The variance of each change of an average of weight w is 2 w^2/(2 - w), less while it still remembers its start.
     ("at rest", lambda found: found.flicker, SIGMA * WEIGHT * math.sqrt(2 / (2 - WEIGHT)), 0.05 * SIGMA),
 ]

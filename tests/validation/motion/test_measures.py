@@ -37,9 +37,9 @@ def noise(seed: int, sigma: float) -> np.ndarray:
     return sigma * MEAN * np.random.default_rng(seed).normal(size=LIGHT.shape)
 
 
-def ghosted(share: float, age: int) -> np.ndarray:
+def ghosted(fraction: float, age: int) -> np.ndarray:
     frames = LIGHT.copy()
-    frames[age:] += share * np.maximum(LIGHT[:-age] - LIGHT[age:], 0)
+    frames[age:] += fraction * np.maximum(LIGHT[:-age] - LIGHT[age:], 0)
     return frames
 
 

@@ -40,7 +40,7 @@ def test_white_noise_has_the_closed_form():
     )  # 768/(4 pi s^2) = 4 independent places of 16 runs, 3 channels
     assert found.efficiency == pytest.approx(1 / (found.variance.value * 0.25))
     assert found.seconds_to(0.05) == pytest.approx(found.variance.value * 0.25 / 0.05**2, rel=0.02)
-    assert found.largest_share < 0.01
+    assert found.largest_fraction < 0.01
 
 
 def test_noise_of_another_spectrum_is_told():
@@ -49,8 +49,8 @@ def test_noise_of_another_spectrum_is_told():
     blue = [REFERENCE + 0.1 * (each - np.roll(each, 1, axis=1)) for each in white]
     blotches = [REFERENCE + 0.1 * sum(np.roll(each, shift, axis=(0, 1)) for shift in range(4)) for each in white]
     # |1 - exp(-2 pi i f)|^2 is below 0.59 for f < 1/8, and depends on one frequency of two: 0.1 of its mean.
-    assert measure_noise(REFERENCE, blue).low_share < 0.3
-    assert measure_noise(REFERENCE, blotches).low_share > 1.5
+    assert measure_noise(REFERENCE, blue).low_fraction < 0.3
+    assert measure_noise(REFERENCE, blotches).low_fraction > 1.5
 
 
 @pytest.mark.claim("noise-bias")
@@ -102,7 +102,7 @@ def test_a_heavy_tail_is_not_taken_for_a_bias():
 @pytest.mark.claim("noise-bias")
 @pytest.mark.parametrize("runs", [2, 5])
 def test_the_squared_bias_is_unbiased(runs):
-    """Its mean of 300 repeats is within three errors of the square that was planted, also from two runs."""
+    """Its mean of 300 repeats is within three errors of the square that was injected, also from two runs."""
     reference, bias, sigma = REFERENCE[:4, :4], 0.05, 0.2
     random = np.random.default_rng(runs)
     noise = sigma * random.normal(size=(300, runs, *reference.shape))

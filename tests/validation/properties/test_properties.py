@@ -40,8 +40,8 @@ def test_they_are_what_the_scene_holds(variant):
     assert properties["triangles"] == 14
     assert properties["mean_cosine"] == pytest.approx(0.6, abs=2e-3)
     # A third of the rays meets the floor, which ends 9 m away, and some the box.
-    assert 0.3 < properties["surface_share"] < 0.5
-    assert 0.8 < properties["lit_share"] < 1
+    assert 0.3 < properties["surface_fraction"] < 0.5
+    assert 0.8 < properties["lit_fraction"] < 1
     assert properties["pixels"] == 64 * 48
 
 

@@ -340,7 +340,9 @@ def table(words, values):
     return np.array([float(word) for word in text.split(",")])
 
 
-@pytest.mark.claim("droplets-in-scenes", tolerance="0.001 of the share and of g, 0.1 % of values from 10 to 30 degrees")
+@pytest.mark.claim(
+    "droplets-in-scenes", tolerance="0.001 of the fraction and of g, 0.1 % of values from 10 to 30 degrees"
+)
 def test_a_table_keeps_the_light_of_the_peak(variant):
     values = table("mie", 2001)
     cosine = np.linspace(-1, 1, len(values))
@@ -350,7 +352,7 @@ def test_a_table_keeps_the_light_of_the_peak(variant):
     assert 0.5 * np.trapezoid(p, fine) == pytest.approx(1, abs=1e-9)
     assert 0.5 * np.trapezoid(p * fine, fine) == pytest.approx(full.g, abs=1e-3)
     peak = fine >= np.cos(np.deg2rad(5))
-    assert 0.5 * np.trapezoid(p[peak], fine[peak]) == pytest.approx(full.share(0, 5), abs=2e-3)
+    assert 0.5 * np.trapezoid(p[peak], fine[peak]) == pytest.approx(full.fraction(0, 5), abs=2e-3)
     angle = np.deg2rad(np.linspace(10, 30, 200))
     assert np.interp(np.cos(angle), cosine, values) == pytest.approx(full(np.cos(angle)), rel=1e-3)
 

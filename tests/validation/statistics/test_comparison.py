@@ -24,7 +24,7 @@ def test_hand_computed_values():
     error = np.sqrt(4 * 0.08**2 + 1.02**2 * 4 * 0.06**2) / 10
     assert s.relative_bias_ci == pytest.approx((0.02 - 1.959964 * error, 0.02 + 1.959964 * error), rel=1e-6)
     assert s.detectable_bias == pytest.approx((1.959964 + 1.281552) * error, rel=1e-6)
-    assert s.largest_share == pytest.approx(0.25, rel=1e-12)
+    assert s.largest_fraction == pytest.approx(0.25, rel=1e-12)
     assert s.relative_bias_ci_batches is None
     assert s.equivalent is True
     assert s.blocks == 1
@@ -72,11 +72,11 @@ def test_the_variance_of_both_sides_counts_and_is_told_apart():
     statistics = compare_statistics(
         Estimate(np.ones((3, 4)), np.full((3, 4), 0.3)), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4))
     )
-    assert statistics.reference_variance_share == pytest.approx(9 / 25, rel=1e-12)
+    assert statistics.reference_variance_fraction == pytest.approx(9 / 25, rel=1e-12)
     assert statistics.relative_bias_se == pytest.approx(0.5 / np.sqrt(12), rel=1e-12)
     assert (statistics.relative_bias_p, statistics.relative_bias_freedom) == (1, None)
     exact_reference = compare_statistics(Estimate(np.ones((3, 4))), Estimate(np.ones((3, 4)), np.full((3, 4), 0.4), 5))
-    assert exact_reference.reference_variance_share == 0
+    assert exact_reference.reference_variance_fraction == 0
     assert exact_reference.relative_bias_freedom == pytest.approx(12 * 4, rel=1e-12)
 
 

@@ -68,7 +68,7 @@ def test_quantile_holds_the_true_one_at_least_as_often_as_it_says():
     for _ in range(4000):
         _, low, high = quantile_interval(rng.exponential(size=60), 0.8)
         held += (low or 0) <= -np.log(0.2) <= (np.inf if high is None else high)
-    # Order statistics cannot hit the level exactly: they exceed it. Four standard errors of a share of 4000: 0.014.
+    # Order statistics cannot hit the level exactly: they exceed it. Four standard errors of a fraction of 4000: 0.014.
     assert held / 4000 > 0.95 - 0.014
 
 
@@ -94,7 +94,7 @@ def test_rank_correlation_holds_the_true_one_about_as_often_as_it_says():
             x = rng.normal(size=80)
             _, low, high = rank_correlation(x, c * x + np.sqrt(1 - c * c) * rng.normal(size=80))
             held += low <= reference <= high
-        # An approximation: within 0.015 of the level, and four standard errors of a share of 2000, 0.0195.
+        # An approximation: within 0.015 of the level, and four standard errors of a fraction of 2000, 0.0195.
         assert held / 2000 == pytest.approx(0.95, abs=0.035)
 
 

@@ -16,11 +16,11 @@ from tests.helpers.calibration import (
     Experiment,
     around_one,
     calibrate,
+    fraction_interval,
     log_normal,
     monte_carlo,
     power_and_finds,
     problems,
-    share_interval,
     spread_to_detect,
 )
 from validation.statistics.comparison import Estimate, compare_statistics
@@ -45,7 +45,7 @@ def repeated(draw, *, runs, batches=BATCHES, shape=SIZE, by_batch=True, margin=N
 
 def assert_rate(events, probability):
     events = list(events)
-    low, high = share_interval(probability, len(events), OUTSIDE)
+    low, high = fraction_interval(probability, len(events), OUTSIDE)
     assert low <= np.mean(events) <= high, f"rate {np.mean(events):.4f}, expected {probability:.4f}"
 
 
@@ -117,7 +117,7 @@ def test_the_printed_power_is_the_share_that_finds_a_bias(bias, wider):
     """From hardly ever to nearly always, both images random."""
     both = Experiment(runs=600, noisy_reference=True, seed=round(1e4 * bias + 10 * wider))
     predicted, found = power_and_finds(bias, both, spread=wider * spread_to_detect(bias, both))
-    low, high = share_interval(predicted, both.runs, 1e-4)
+    low, high = fraction_interval(predicted, both.runs, 1e-4)
     assert low <= found <= high
 
 
@@ -129,11 +129,11 @@ def test_skewed_noise_breaks_the_count_of_pixels_first_and_the_interval_last():
     )
     assert 0.15 < mild["pixel_alarms"] < 0.45
     assert skewed["pixel_alarms"] > 0.9
-    low, high = share_interval(0.95, 400, 1e-4)
+    low, high = fraction_interval(0.95, 400, 1e-4)
     for calibration in (mild, skewed):
         assert low <= calibration["coverage"] <= high
         assert low <= calibration["coverage_batches"] <= high
-    assert mild["block_alarms"] <= share_interval(0.01, 400, 1e-4)[1]
+    assert mild["block_alarms"] <= fraction_interval(0.01, 400, 1e-4)[1]
     assert heavy["coverage"] < 0.92
     # It is noticed where the interval is still right, and always where it is not.
     assert mild["exceeding_alarms"] > 0.4

@@ -57,7 +57,7 @@ def test_errors_of_a_map_are_of_first_order(variant, lamp):
 @pytest.mark.claim("flicker", tolerance="order 1/2 within 0.2")
 @pytest.mark.parametrize("lamp", ["point", "spot"])
 def test_flicker_of_fractions_of_a_texel_is_of_order_one_half(variant, lamp):
-    """A share of the edges jumps a frame: the fits of three steps and two lights scatter by 0.06 about 0.5."""
+    """A fraction of the edges jumps a frame: the fits of three steps and two lights scatter by 0.06 about 0.5."""
     scene = small_scene(**({"lamp": spot()} if lamp == "spot" else {}))
     sizes = (32, 64, 128, 256)
     turn = round(2 * np.pi / 2e-3)  # so that a shadow moves by 0.03 to 0.26 texels a frame

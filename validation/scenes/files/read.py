@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene file made into Mitsuba's scene: parsed, mended, built."""
+"""A scene file made into Mitsuba's scene: parsed, repaired, built."""
 
 import re
 from collections.abc import Mapping

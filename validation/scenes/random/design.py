@@ -55,7 +55,7 @@ class Draws:
         """
         return Draws(self._seed, self._attempt, part)
 
-    def share(self, name: str = "") -> float:
+    def fraction(self, name: str = "") -> float:
         """Return a number within (0, 1), the coordinate of that name if the point has one."""
         if name in self._point:
             return self._point[name]
@@ -64,11 +64,11 @@ class Draws:
 
     def between(self, low: float, high: float, *, name: str = "") -> float:
         """Return a number within a range, evenly."""
-        return low + (high - low) * self.share(name)
+        return low + (high - low) * self.fraction(name)
 
     def logarithmic(self, low: float, high: float, *, name: str = "") -> float:
         """Return a number within a range of positive numbers, evenly in the logarithm."""
-        return float(low * math.exp(math.log(high / low) * self.share(name)))
+        return float(low * math.exp(math.log(high / low) * self.fraction(name)))
 
     def count(self, low: float, high: float, *, name: str = "") -> int:
         """Return a whole number from `low` to `high`, evenly in the logarithm."""
@@ -77,11 +77,11 @@ class Draws:
     def few(self, low: float, high: float, *, name: str = "") -> int:
         """Return a whole number from `low` to `high`, of which small ones come more often than by `count`."""
         span = math.log((high + 1.5) / (low + 0.5))
-        return min(math.floor((low + 0.5) * math.exp(span * self.share(name) ** 2) - 0.5), int(high))
+        return min(math.floor((low + 0.5) * math.exp(span * self.fraction(name) ** 2) - 0.5), int(high))
 
     def pick(self, weights: Mapping[str, float], name: str = "") -> str:
         """Return one of several words by their weights."""
-        left = self.share(name) * sum(weights.values())
+        left = self.fraction(name) * sum(weights.values())
         for word, weight in weights.items():
             left -= weight
             if left < 0:
@@ -96,7 +96,7 @@ class Draws:
 
     def in_ball(self) -> NDArray[np.float64]:
         """Return a point within the unit ball, evenly, (3,)."""
-        return self.vector() * self.share() ** (1 / 3)
+        return self.vector() * self.fraction() ** (1 / 3)
 
 
 @lru_cache(maxsize=64)

@@ -37,7 +37,7 @@ class Light:
     size: tuple[float, ...] = ()  #: radius, or half of both sides
     cutoff: float = 0.0  #: of a spot, half angle [degrees]
     beam: float = 0.0  #: of a spot, half angle of full intensity [degrees]
-    black: bool = True  #: whether the shape of a light with extent is opaque
+    black: bool = True  #: whether the shape of an area light is opaque
 
     @property
     def ball(self) -> float:
@@ -83,7 +83,7 @@ def _light(
         first = draws if attempt == 0 else stream
         elevation = math.asin(
             math.sin(math.radians(-17.0))
-            + (1 + math.sin(math.radians(17.0))) * first.share(f"light_elevation-{number}") * 0.99
+            + (1 + math.sin(math.radians(17.0))) * first.fraction(f"light_elevation-{number}") * 0.99
         )
         azimuth = first.between(0, 2 * math.pi, name=f"light_azimuth-{number}")
         across = math.cos(elevation)
@@ -107,8 +107,8 @@ def _light(
         # A narrow cone that begins near by would light next to nothing.
         least = math.degrees(math.atan(_LEAST_CONE / float(np.linalg.norm(target - position))))
         cutoff = max(draws.logarithmic(*ranges["cutoff"], name=f"cutoff-{number}"), min(least, ranges["cutoff"][1]))
-        share = draws.share(f"beam-{number}")
-        beam = cutoff * (1.0 if share > 0.6 else 0.07 + 1.4 * share)
+        fraction = draws.fraction(f"beam-{number}")
+        beam = cutoff * (1.0 if fraction > 0.6 else 0.07 + 1.4 * fraction)
     if kind in AREA_KINDS:
         strength /= 4 * size[0] * size[1] if kind == "rectangle" else math.pi * size[0] ** 2  # the projected area
     black = draws.pick(ranges["light_materials"], f"light_material-{number}") == "black"
@@ -125,8 +125,8 @@ def _size(draws: Draws, stream: Draws, ranges: Ranges, kind: str, number: int) -
 def _ahead(media: list[Medium], camera: Array, axis: Array) -> Array:
     """Return a point on the axis of the camera, the middle of the stage or where the optical depth is about 2."""
     far = float(np.linalg.norm(camera))
-    for share in (1.0, 0.83, 0.67, 0.51, 0.37, 0.23, 0.13):
-        point = camera + share * far * axis
+    for fraction in (1.0, 0.83, 0.67, 0.51, 0.37, 0.23, 0.13):
+        point = camera + fraction * far * axis
         if depths(media, camera, point).mean() < 2:
             return point
     return camera + max(0.07 * far, 1.7 * _CLEAR) * axis
@@ -134,8 +134,8 @@ def _ahead(media: list[Medium], camera: Array, axis: Array) -> Array:
 
 def _nearer(media: list[Medium], camera: Array, ahead: Array, position: Array) -> Array:
     """Return a position from which enough light arrives, moved towards a point ahead where needed."""
-    for share in (1.0, 0.71, 0.5, 0.35, 0.25, 0.17, 0.11):
-        moved = ahead + share * (position - ahead)
+    for fraction in (1.0, 0.71, 0.5, 0.35, 0.25, 0.17, 0.11):
+        moved = ahead + fraction * (position - ahead)
         way = depths(media, moved, ahead).mean() + depths(media, ahead, camera).mean()
         if way < _DEEPEST:
             return moved

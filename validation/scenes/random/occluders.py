@@ -98,8 +98,8 @@ def _place(stream: Draws, ranges: Ranges, kind: str, size: float, lights: Sequen
     """Return a place for an occluder: in the stage, or for a screen before a light too."""
     low, high = ranges["occluder_size"]
     radius = min(max(size * stream.logarithmic(0.41, 2.43), low), high)
-    if kind in _SCREENS and stream.share() < 0.4:
-        light = lights[int(stream.share() * len(lights))]
+    if kind in _SCREENS and stream.fraction() < 0.4:
+        light = lights[int(stream.fraction() * len(lights))]
         toward = light.position / np.linalg.norm(light.position)
         away = min(float(np.linalg.norm(light.position)), 2.3)
         return stream.between(0.29, 0.83) * away * toward + 0.23 * stream.in_ball(), min(2.1 * radius, 0.9)
@@ -154,7 +154,7 @@ def _solid(stream: Draws, kind: str, files: Sequence[Path]) -> Mesh:
         case "pierced":
             return _pierced(stream)
         case "mesh":
-            return _user_mesh(files[int(stream.share() * len(files))])
+            return _user_mesh(files[int(stream.fraction() * len(files))])
     return icosphere(0)  # of a ball
 
 
@@ -179,13 +179,13 @@ def _fence(stream: Draws) -> Mesh:
 
 
 def _pierced(stream: Draws) -> Mesh:
-    """Return a slab with holes across and upwards, a share of its sides."""
+    """Return a slab with holes across and upwards, a fraction of its sides."""
     across, up = stream.count(1, 7), stream.count(1, 5)
-    share, thickness = stream.between(0.29, 0.79), stream.logarithmic(0.011, 0.13)
+    fraction, thickness = stream.between(0.29, 0.79), stream.logarithmic(0.011, 0.13)
 
     def lines(holes: int, half: float) -> Array:
-        rib = (1 - share) / (holes + 1)
-        widths = np.array([rib, *([share / holes, rib] * holes)])
+        rib = (1 - fraction) / (holes + 1)
+        widths = np.array([rib, *([fraction / holes, rib] * holes)])
         return 2 * half * np.concatenate([[0.0], np.cumsum(widths)])
 
     x, y = 0.71, 0.67
@@ -205,7 +205,7 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
     """Return a plate between the camera and a light, across the way."""
     way = light.position - camera
     length = float(np.linalg.norm(way))
-    # Nearer to the camera than a directional light is, and beyond what a light with extent reaches around.
+    # Nearer to the camera than a directional light is, and beyond what an area light reaches around.
     distance = min(stream.between(0.31, 0.57) * length, stream.between(0.9, 1.7))
     room = min(distance, length - distance - light.ball)
     needed = 1.3 * light.ball * distance / length
@@ -214,7 +214,7 @@ def _shade(stream: Draws, camera: Array, light: Light) -> Occluder:
     axis, angle = turning(np.array([0.0, 0.0, 1.0]), forward / np.linalg.norm(forward))
     position = camera + distance * way / length
     reflectance = np.array([stream.between(0.07, 0.53) for _ in range(3)])
-    half = 0.69 + 0.03 * stream.share()
+    half = 0.69 + 0.03 * stream.fraction()
     mesh = box((2 * half, 2 * math.sqrt(1 - half**2), 2 * stream.logarithmic(0.0017, 0.031)))
     return _placed("plate", mesh, position, radius, (axis, angle), reflectance)
 

@@ -49,8 +49,8 @@ class RandomScene:
     media: tuple[Medium, ...]  #: an unbounded one first
     lights: tuple[Light, ...]
     occluders: tuple[Occluder, ...]
-    lit: float = 0.0  #: share of points in view that a light reaches
-    near: float = 0.0  #: share of rays that meet a surface before half of the way to the middle of the stage
+    lit: float = 0.0  #: fraction of points in view that a light reaches
+    near: float = 0.0  #: fraction of rays that meet a surface before half of the way to the middle of the stage
     camera_lit: bool = False  #: whether the first light reaches the camera
 
     @property
@@ -153,8 +153,8 @@ def with_reach(drawn: RandomScene, occluders: Any) -> RandomScene:
     away = float(np.linalg.norm(drawn.origin - drawn.centre))
     hit = distance(occluders, np.broadcast_to(drawn.origin, directions.shape), directions)
     free = np.minimum(hit, away + drawn.scale)
-    share = (np.arange(_ALONG) + 0.5) / _ALONG
-    points = (drawn.origin + (free[:, None] * share)[..., None] * directions[:, None]).reshape(-1, 3)
+    fraction = (np.arange(_ALONG) + 0.5) / _ALONG
+    points = (drawn.origin + (free[:, None] * fraction)[..., None] * directions[:, None]).reshape(-1, 3)
     lights = [_place(each) for each in drawn.lights]
     lit = np.any([lit_points(occluders, each, points) for each in lights], axis=0)
     camera_lit = bool(lit_points(occluders, lights[0], drawn.origin[None])[0])

@@ -112,7 +112,7 @@ def test_outside_the_grid_what_happens_is_what_the_page_says(look_up):
 
 
 def _printed(number, t, d, mu, cos_phi, sin_phi, mu_l):
-    """Return a transport of the form of Bouthors 2008, section 5.2, with numbers of our own and depths in shares of t.
+    """Return a transport of the form of Bouthors 2008, section 5.2, with our own numbers and depths in fractions of t.
 
     A bell at a depth that does not shrink with t is beyond thin slabs, where nothing of it is left to fit.
     """

@@ -231,9 +231,9 @@ def test_samples_converge_to_all_pixels(variant, change):
     assert fine < 6e-3
 
 
-@pytest.mark.claim("a-lit-share")
+@pytest.mark.claim("a-lit-fraction")
 def test_no_pixel_is_brighter_than_without_shadows(variant):
-    """Lights in view and sharp phase functions: shares of a rough estimate made an image 363 times too bright."""
+    """Lights in view and sharp phase functions: fractions of a rough estimate made an image 363 times too bright."""
     scene = read_scene(load_scene("random:427", (80, 60)).scene)
     image, bare = (
         np.asarray(render_frame(prepared(scene, configuration(method, None, {}))).airlight)

@@ -92,8 +92,8 @@ def by_hand(scene, *, width, height, slices, far):
             y = np.clip((row + 0.5) / reference.height * height - 0.5, 0, height - 1)
             for i in range(width):
                 for j in range(height):
-                    share = max(0, 1 - abs(x - i)) * max(0, 1 - abs(y - j))
-                    image[row, column] += share * sums[slices, j, i]
+                    fraction = max(0, 1 - abs(x - i)) * max(0, 1 - abs(y - j))
+                    image[row, column] += fraction * sums[slices, j, i]
     return image
 
 

@@ -38,9 +38,9 @@ from validation.estimates.quadrature import reference_image
 #: One of a kind; beside the view the faces of the cube that a tile passes count.
 FEW = ("light beside the view", "light in view", "fence", "spot in view")
 
-#: Share of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim of a cone, some
+#: Fraction of the pixels that must be within 1e-4 of their own value. Where many rays graze the rim of a cone, some
 #: millimetres of 3 m are lit, of which float32 holds 1e-4, or at the rim of a soft one what is lit is as dim.
-SHARES = {"soft spot": 0.994, "three lights": 0.998}
+FRACTIONS = {"soft spot": 0.994, "three lights": 0.998}
 
 
 @pytest.mark.claim("exact-for-its-map", tolerance="float32: 1e-5 of the largest")
@@ -58,7 +58,7 @@ def test_frames_are_exact_with_respect_to_the_map(variant, name, walls):
         error = np.abs(frame.airlight - wanted)
         # The kernel's 5e-6 of the value, and room for the rounding of some terms.
         assert np.max(error) < 1e-5 * np.max(wanted)
-        assert np.mean(error <= 1e-4 * wanted) > SHARES.get(name, 0.999)
+        assert np.mean(error <= 1e-4 * wanted) > FRACTIONS.get(name, 0.999)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (18, 13)])
@@ -143,11 +143,11 @@ def test_any_map(variant, kind, data):
     assert np.max(np.abs(walked.airlight - wanted)) < 1e-7 * scale
 
 
-def any_walls(rng, faces, share):
-    """Return the numbers of walls of texels of which a share of the sides has one, anywhere."""
+def any_walls(rng, faces, fraction):
+    """Return the numbers of walls of texels of which a fraction of the sides has one, anywhere."""
     level, upright = rng.integers(1, PLACES + 1, (2, faces, SMALL + 1, SMALL + 1), dtype=np.uint32)
-    level[rng.random(level.shape) >= share] = 0
-    upright[rng.random(upright.shape) >= share] = 0
+    level[rng.random(level.shape) >= fraction] = 0
+    upright[rng.random(upright.shape) >= fraction] = 0
     sides = level[:, :-1, :-1], level[:, 1:, :-1], upright[:, :-1, :-1], upright[:, :-1, 1:]
     return sum(side << np.uint32(8 * k) for k, side in enumerate(sides)).ravel()
 

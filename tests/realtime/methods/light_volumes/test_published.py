@@ -83,8 +83,8 @@ def grid_points(numbers, size: int):
     return np.stack([numbers % (size + 1), numbers // (size + 1)], axis=-1)
 
 
-def random_edges(rng, *, faces: int, levels: int, share: float):
-    return [rng.random((faces, 2**level, 2**level)) < share for level in range(levels)]
+def random_edges(rng, *, faces: int, levels: int, fraction: float):
+    return [rng.random((faces, 2**level, 2**level)) < fraction for level in range(levels)]
 
 
 @pytest.mark.claim("no-t-junctions")
@@ -92,8 +92,8 @@ def test_meshes_of_random_divisions_have_no_gaps():
     rng = np.random.default_rng(4)
     configurations = set()
     size = 32
-    for share in (0.02, 0.1, 0.3):
-        divided = divide(random_edges(rng, faces=1, levels=5, share=share))
+    for fraction in (0.02, 0.1, 0.3):
+        divided = divide(random_edges(rng, faces=1, levels=5, fraction=fraction))
         for _, _, sides in quads(divided):
             configurations |= set(sides.tolist())
         corners = triangles(divided)
@@ -113,7 +113,7 @@ def test_meshes_of_random_divisions_have_no_gaps():
 def test_divided_sides_differ_by_one_level():
     """Seen through the depth of the quad at every texel, not through the flags."""
     rng = np.random.default_rng(7)
-    edge = random_edges(rng, faces=1, levels=6, share=0.01)
+    edge = random_edges(rng, faces=1, levels=6, fraction=0.01)
     divided = divide(edge)
     depth = np.zeros((64, 64), int)
     for flags in divided:

@@ -36,7 +36,7 @@ def scene_with(mesh, *, size=(24, 18), **changes):
     scene["sensor"] = scene["sensor"] | {"film": film}
     if mesh is not None:
         vertices, faces = mesh
-        scene["caster"] = mitsuba_mesh("caster", (vertices + SHIFT, faces), (0.5, 0.4, 0.3))
+        scene["occluder"] = mitsuba_mesh("occluder", (vertices + SHIFT, faces), (0.5, 0.4, 0.3))
     return mi.load_dict(scene)
 
 
@@ -58,7 +58,7 @@ def assert_is_reference(frame, image, *, rmse=1e-5):
 
 
 def surface_differs(frame, image):
-    """The share of pixels whose surface is lit in one and dark in the other.
+    """The fraction of pixels whose surface is lit in one and dark in the other.
 
     The reference's shadow rays start 1e-4 m above the surface and are cast in float32: at the edge of a shadow they and
     the planes may differ by a pixel.

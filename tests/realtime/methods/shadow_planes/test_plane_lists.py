@@ -122,7 +122,7 @@ def rays_of(index, ways, end=None):
 MESHES = ["torus", "crossing spheres", "open cylinder", "Moebius strip", "mixed winding", "boxes sharing an edge"]
 ASIDE = {
     "aside": CAMERA,
-    "behind the casters": 1.3 * CAMERA - 0.9 * LIGHT,
+    "behind the occluders": 1.3 * CAMERA - 0.9 * LIGHT,
     "near the light": LIGHT - (0.02, 0.01, 0.03),
 }
 
@@ -216,7 +216,7 @@ def test_exact_order_is_right_where_shadows_overlap(variant):
     end = np.full(len(ways), 4.7)
     expected, lit = lit_lengths(index, ways, end, weight=weight)
     total, total_lit = added_up(index, ways, end, order="exact")
-    # Two crossings can come in the wrong order within a wedge: that is counted, not mended.
+    # Two crossings can come in the wrong order within a wedge: that is counted, not repaired.
     wrong = (np.abs(total - expected) > 1e-4) | (total_lit != lit)
     assert wrong.mean() < 0.03
 

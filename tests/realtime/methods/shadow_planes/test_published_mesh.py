@@ -25,11 +25,11 @@ def frame(parameters):
 
 
 def test_many_edges_are_the_cone_itself_and_fewer_are_darker_by_the_square(variant):
-    """A regular polygon has the share 1 - (2 pi / N)^2 / 6 of its circle: four times the edges, a sixteenth missing."""
+    """A regular polygon has the fraction 1 - (2 pi / N)^2 / 6 of its circle: four times the edges, a sixteenth."""
     whole = frame({}).airlight
     missing = [1 - frame({"cone": sides}).airlight.mean() / whole.mean() for sides in (16, 64, 4096)]
     assert 0.01 < missing[0] < 0.05
-    # The 3072 pixels and the sphere's shadow in the middle leave a share of it to chance.
+    # The 3072 pixels and the sphere's shadow in the middle leave a fraction of it to chance.
     assert missing[0] / missing[1] == pytest.approx(16, rel=0.2)
     assert abs(missing[2]) < 1e-5
     many = frame({"cone": 4096})
@@ -60,7 +60,7 @@ render = partial(frames.render, method="shadow-planes", precision="double")
 def occluder(centre=(0.55, 0.2, 1.35), radius=0.28):
     vertices, faces = closed_sphere(3)
     placed = np.array(centre) + radius * np.asarray(vertices)
-    return mitsuba_mesh("caster", (placed, np.asarray(faces)), (0.5, 0.4, 0.3))
+    return mitsuba_mesh("occluder", (placed, np.asarray(faces)), (0.5, 0.4, 0.3))
 
 
 def fog(centre, radius, sigma=0.9):

@@ -28,7 +28,7 @@ render = partial(frames.render, precision="double")
 @pytest.mark.claim("directional-light-volumes", tolerance="relative RMSE 1e-6, in float32 1e-5")
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_a_box_under_light_from_above_has_a_closed_form(variant, precision):
-    """With the light coming straight down the leg is H - z, linear in x, and the integral is an exponential's.
+    """With the light coming straight down the segment is H - z, linear in x, and the integral is an exponential's.
 
     int_0^c exp(-sigma x - sigma (H - z_0 - x d_z)) dx = exp(-sigma (H - z_0)) (1 - exp(-k c))/k,  k = sigma (1 - d_z).
     """
@@ -91,8 +91,8 @@ def along_the_light():
 
 CIRCLE = np.stack([np.cos(np.arange(12) * np.pi / 6), np.sin(np.arange(12) * np.pi / 6)], axis=1)
 #: Scenes and the relative RMSE of the airlight, in float64 and float32. Segments are cut where the edges of a box bend
-#: the leg's length, which leaves 1e-5; corners of media are float32 numbers, 1e-7. Between nodes that are spread over a
-#: chord lie the kinks of 80 facets.
+#: the segment's length, which leaves 1e-5; corners of media are float32 numbers, 1e-7. Between nodes that are spread
+#: over a chord lie the kinks of 80 facets.
 SCENES = {
     "lamp above": (lambda: under_lamp(0.9, 0.7, 1.9), 3e-5, 3e-5),
     "lamp through one to the other": (lambda: under_lamp(-2.9, 0.6, 0.5), 3e-5, 3e-5),
@@ -152,8 +152,8 @@ def test_an_ambient_field_fills_bounded_media(variant):
 def test_random_scenes_against_the_reference(variant, scene, bound):
     """What sweeps found; the error before, at 160 x 120, and at rays that meet edges what is left.
 
-    Legs graze spheres in the fog around them (2: 9e-5); light from infinity bends at the 72 facets of two bodies (84:
-    1.7e-3); legs pass edges of boxes on their way to fog and other boxes (146: 1.2e-3).
+    Segments graze spheres in the fog around them (2: 9e-5); light from infinity bends at the 72 facets of two bodies
+    (84: 1.7e-3); segments pass edges of boxes on their way to fog and other boxes (146: 1.2e-3).
     """
     loaded = load_scene(scene, (64, 48)).scene
     reference = reference_image(loaded).airlight

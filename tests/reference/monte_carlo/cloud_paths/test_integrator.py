@@ -176,9 +176,9 @@ def test_standard_errors_cover_the_reference_as_often_as_they_say(variant):
         batches = paths(clouds, 32, 64, first=1000 + 32 * run)
         z = (batches.mean[0][:, 1] - reference) / batches.standard_error[0][:, 1]
         held.append(np.abs(z) < t.ppf(0.975, 31))
-    share = np.mean(held)
+    fraction = np.mean(held)
     spread = math.sqrt(0.95 * 0.05 / np.size(held))
-    assert abs(share - 0.95) < norm.ppf(1 - 5e-5) * spread + 0.005  # batches of 64 paths are skewed
+    assert abs(fraction - 0.95) < norm.ppf(1 - 5e-5) * spread + 0.005  # batches of 64 paths are skewed
 
 
 def test_order_one_is_its_integral(variant):
@@ -240,7 +240,7 @@ def rough(**changes):
 def test_an_even_grid_is_a_homogeneous_cloud(variant):
     """Half the largest density everywhere but in a corner without cloud: flights end where nothing is."""
     values = np.full((40, 40, 40), 0.5)
-    values[0, 0, 0] = 1.0  # beyond the box but for a share of 1e-5 of a voxel
+    values[0, 0, 0] = 1.0  # beyond the box but for a fraction of 1e-5 of a voxel
     even = paths(clouds_of(rough(values=values)), 24, 256)
     homogeneous = paths(clouds_of(DROPLETS | {"sigma_t": 0.5 * 0.0517, "albedo": 0.96}), 24, 256, first=100)
     check_equal(even, homogeneous, 0.02, ("airlight", "airlight_1"))

@@ -28,16 +28,16 @@ SPANS = {  # height, start, length, extinctions
     "light ahead": (0.7, -3.1, 7.3, [0.31]),
     "light behind": (0.9, 2.3, 4.7, [0.5]),
     "beyond the surface": (1.3, -6.1, 2.9, [0.21]),
-    "endless": (0.4, -2.2, np.inf, [0.17]),
-    "endless, light behind": (0.4, 1.7, np.inf, [0.6]),
+    "unbounded": (0.4, -2.2, np.inf, [0.17]),
+    "unbounded, light behind": (0.4, 1.7, np.inf, [0.6]),
     "near": (2e-3, -1.9, 5.3, [0.4]),
-    "near and endless": (1e-4, -41.0, np.inf, [1.3e-3]),
+    "near and unbounded": (1e-4, -41.0, np.inf, [1.3e-3]),
     "short": (0.8, -0.3, 1e-3, [2.0]),
     "distant": (0.6, -900.0, 0.5, [0.05]),
     "thin": (0.5, -1.1, 3.0, [1e-9]),
     "thick": (0.9, -8.0, 19.0, [7.0]),
     "coloured": (0.7, -2.5, 6.0, [0.02, 0.4, 3.1]),
-    "coloured and endless": (0.3, -1.5, np.inf, [0.1, 0.3, 0.7]),
+    "coloured and unbounded": (0.3, -1.5, np.inf, [0.1, 0.3, 0.7]),
 }
 SAMPLES = 1 << 16
 CELLS = 101
@@ -69,10 +69,10 @@ def _technique(case, name):
 
 
 def _edges(case, sample):
-    """Return cells that hold about equal shares of the samples and of the length, to the end of the span."""
+    """Return cells that hold about equal fractions of the samples and of the length, to the end of the span."""
     length = SPANS[case][2]
-    shares = np.array(sample(aligned_array(mi.Float64, np.arange(1, CELLS) / CELLS)), dtype=np.float64)
-    return np.concatenate([[0.0], np.unique(shares), [length]])
+    fractions = np.array(sample(aligned_array(mi.Float64, np.arange(1, CELLS) / CELLS)), dtype=np.float64)
+    return np.concatenate([[0.0], np.unique(fractions), [length]])
 
 
 def _probabilities(edges, density):

@@ -54,7 +54,7 @@ def lamp(**changes):
     return tiny_scene()["lamp"] | changes
 
 
-#: Media in bounds, under suns and lamps: legs are walked from boundary to boundary.
+#: Media in bounds, under suns and lamps: segments are walked from boundary to boundary.
 MEDIA = {
     "sun on box and sphere": lambda: in_media(**ball_over_floor()),
     "thick, light from behind": lambda: in_media(
@@ -86,7 +86,7 @@ def test_agrees_with_the_quadrature(variant, name):
     assert lit.sum() > 60
     assert np.all(mean[~lit] == 0)
     # Rounding in single precision: 3e-6 of a value, to be seen where the sampling error is smaller still; it puts
-    # boundaries and legs that are some metres long to 1e-6 m.
+    # boundaries and segments that are some metres long to 1e-6 m.
     rounding = 3e-6 * (expected + (expected[lit].mean() if name in MEDIA else 0))[lit]
     score = (mean - expected)[lit] / np.hypot(error[lit], rounding)
     assert np.abs(score).max() < t.isf(0.5e-4 / lit.sum(), _BATCHES - 1)

@@ -22,7 +22,7 @@ def reference(variant):
 
 
 def test_one_kernel_serves_any_number_of_samples(reference):
-    """Rationale: a kernel is compiled anew for how the memory lies that it reads, and NumPy's lies anywhere."""
+    """Rationale: a kernel is compiled again for how the memory lies that it reads, and NumPy's lies anywhere."""
     kernels = [_large_kernels(reference, samples=samples, seed=samples) for samples in (3, 4, 5, 8)]
     assert len(set(map(tuple, kernels))) == 1
 

@@ -71,7 +71,9 @@ def points():
     return np.array([[point(seed)[name] for name in COORDINATES] for seed in range(_POINTS)])
 
 
-@pytest.mark.claim("random-cover", tolerance="a sixteenth of the range holds 0.4 to 1.6 times its share of 512 points")
+@pytest.mark.claim(
+    "random-cover", tolerance="a sixteenth of the range holds 0.4 to 1.6 times its fraction of 512 points"
+)
 def test_the_first_points_cover_every_coordinate(points):
     counts = np.array([np.histogram(column, bins=16, range=(0, 1))[0] for column in points.T])
     assert counts.min() > 0.4 * _POINTS / 16

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults that are planted into the reference of a scene, to count how often the diagnosis names them.
+"""Faults that are injected into the reference of a scene, to count how often the diagnosis names them.
 
 Where a fault is one of the scene, such as another extinction, the image is the certified reference of the changed scene
 (`reference.quadrature`), by code that the hypotheses do not have: adaptive integrals in the place of fixed nodes. What
@@ -38,7 +38,7 @@ Make = Callable[[ReferenceScene], Array | None]
 
 
 @dataclass(frozen=True)
-class Planted:
+class Injected:
     """A fault with the name that a diagnosis should give it."""
 
     name: str
@@ -179,31 +179,31 @@ def _swapped(image: Array) -> Array | None:
     return image[..., ::-1] if np.ptp(image, axis=2).max() > 1e-3 * image.max() else None
 
 
-PLANTED = (
-    Planted("right", "nothing"),
-    Planted("factor", "1.07 times as bright", values=lambda image: 1.07 * image),
-    Planted("factor", "4 pi times as bright", values=lambda image: 4 * np.pi * image),
-    Planted("extinction", "the extinction 1.4 times", _of_scene(_optics(lambda s, a: (1.4 * s, a)))),
-    Planted("unit-length", "feet for metres", _of_scene(_in_feet)),
-    Planted("absorption", "no absorption", _of_scene(_optics(_absorption(0.0)))),
-    Planted("albedo", "the albedo twice", _of_scene(_optics(lambda s, a: (s, a * a)))),
-    Planted("albedo", "the albedo left out", _of_scene(_optics(lambda s, a: (s, np.ones_like(a))))),
-    Planted("sigma-s", "extinction for scattering", _of_scene(_optics(lambda s, a: (s / np.maximum(a, 1e-9), a)))),
-    Planted("g", "another g", _of_scene(lambda reference: _media(reference, lambda m: replace(m, phase=_LOBE)))),
-    Planted("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
-    Planted("spot-angle", "cones half as wide", _of_scene(_scenery(_spots, cone=0.5))),
-    Planted("light-position", "the light moved", _of_scene(_scenery(_near_lights, moved=(0.07, -0.05, 0.09)))),
-    Planted("fov-axis", "the other field of view", _of_scene(lambda reference: _pixels(reference, _other_axis))),
-    Planted("shift", "half a pixel", _of_scene(lambda reference: _pixels(reference, lambda p, size: p - [0.5, 0.5]))),
-    Planted("flip", "upside down", values=lambda image: image[::-1]),
-    Planted("flip", "mirrored", values=lambda image: image[:, ::-1]),
-    Planted("transfer", "sRGB", values=to_srgb),
-    Planted("transfer", "gamma 2.2", values=lambda image: image ** (1 / 2.2)),
-    Planted("clamp", "a tenth cut off", values=_clamped),
-    Planted("tone-map", "filmic", values=filmic),
-    Planted("tone-map", "Blender's Filmic", values=blender_filmic),
-    Planted("tone-map", "Blender's AgX", values=agx),
-    Planted("black-level", "a twentieth of the mean added", values=lambda image: image + 0.05 * image.mean()),
-    Planted("vignette", "corners darker by cos^4", _darker_corners),
-    Planted("channels", "B, G, R", values=_swapped),
+INJECTED = (
+    Injected("right", "nothing"),
+    Injected("factor", "1.07 times as bright", values=lambda image: 1.07 * image),
+    Injected("factor", "4 pi times as bright", values=lambda image: 4 * np.pi * image),
+    Injected("extinction", "the extinction 1.4 times", _of_scene(_optics(lambda s, a: (1.4 * s, a)))),
+    Injected("unit-length", "feet for metres", _of_scene(_in_feet)),
+    Injected("absorption", "no absorption", _of_scene(_optics(_absorption(0.0)))),
+    Injected("albedo", "the albedo twice", _of_scene(_optics(lambda s, a: (s, a * a)))),
+    Injected("albedo", "the albedo left out", _of_scene(_optics(lambda s, a: (s, np.ones_like(a))))),
+    Injected("sigma-s", "extinction for scattering", _of_scene(_optics(lambda s, a: (s / np.maximum(a, 1e-9), a)))),
+    Injected("g", "another g", _of_scene(lambda reference: _media(reference, lambda m: replace(m, phase=_LOBE)))),
+    Injected("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
+    Injected("spot-angle", "cones half as wide", _of_scene(_scenery(_spots, cone=0.5))),
+    Injected("light-position", "the light moved", _of_scene(_scenery(_near_lights, moved=(0.07, -0.05, 0.09)))),
+    Injected("fov-axis", "the other field of view", _of_scene(lambda reference: _pixels(reference, _other_axis))),
+    Injected("shift", "half a pixel", _of_scene(lambda reference: _pixels(reference, lambda p, size: p - [0.5, 0.5]))),
+    Injected("flip", "upside down", values=lambda image: image[::-1]),
+    Injected("flip", "mirrored", values=lambda image: image[:, ::-1]),
+    Injected("transfer", "sRGB", values=to_srgb),
+    Injected("transfer", "gamma 2.2", values=lambda image: image ** (1 / 2.2)),
+    Injected("clamp", "a tenth cut off", values=_clamped),
+    Injected("tone-map", "filmic", values=filmic),
+    Injected("tone-map", "Blender's Filmic", values=blender_filmic),
+    Injected("tone-map", "Blender's AgX", values=agx),
+    Injected("black-level", "a twentieth of the mean added", values=lambda image: image + 0.05 * image.mean()),
+    Injected("vignette", "corners darker by cos^4", _darker_corners),
+    Injected("channels", "B, G, R", values=_swapped),
 )
