@@ -48,7 +48,7 @@ def loops(view):
         raise ValueError("in the\\nloop")
     return dr.while_loop((mi.UInt32(0),), lambda i: i < 3, body)
 
-def calls(view, *, kernel=None, steps=7, share=0.5, word="a", on=True, other=None, **rest):
+def calls(view, *, kernel=None, steps=7, fraction=0.5, word="a", on=True, other=None, **rest):
     return 1.0 if callable(kernel) else 0.0
 calls.shadows = False
 calls.frozen = True
