@@ -37,7 +37,10 @@ def refused(words):
         ({"fraction": float("nan")}, "fraction: got nan, wanted"),
         ({"word": "unevn"}, "word: got 'unevn', wanted one of even, uneven; did you mean 'uneven'?"),
         ({"free": -1.0}, "free: wanted on=false with a value below 0"),
-        ({"step": 3}, "method fog: got a parameter 'step', wanted one of: steps, fraction, word, on, free; did you mean"),
+        (
+            {"step": 3},
+            "method fog: got a parameter 'step', wanted one of: steps, fraction, word, on, free; did you mean",
+        ),
         ({"steps": "1.5"}, "method fog: steps got '1.5', wanted a whole number"),
         ({"on": "maybe"}, "method fog: on got 'maybe', wanted true or false"),
     ],
