@@ -258,7 +258,7 @@ MEDIUM = (
         Fault(
             f"{of}-path",
             f"the way {words} is not attenuated for {which}",
-            with_law(**{f"{of}_leg": segments}),
+            with_law(**{f"{of}_segment": segments}),
             needs=("both",),
         )
         for of, words in (("light", "from the light"), ("camera", "to the camera"))

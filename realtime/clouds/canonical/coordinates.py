@@ -225,7 +225,7 @@ def slab_phase(phase: Phase, types: ArrayTypes, *, modified: bool = False) -> An
     """Return the phase function of a scene by its values.
 
     `phase`: of a medium of the scene; `types`: of its numbers; `modified`: whether the peak below `CUT` is cut to zero:
-    then lengths are those of the medium whose density is lowered by `share_of_peak`.
+    then lengths are those of the medium whose density is lowered by `fraction_of_peak`.
     """
     edge = np.deg2rad(CUT)
 

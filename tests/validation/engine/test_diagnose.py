@@ -57,7 +57,7 @@ def marked(injected):
 
 @pytest.mark.claim("diagnosis-injected")
 @pytest.mark.parametrize("injected", [marked(injected) for injected in INJECTED])
-def test_a_injected_fault_comes_first(reference, injected):
+def test_an_injected_fault_comes_first(reference, injected):
     diagnosis = diagnosed(injected.image(reference))
     assert diagnosis.first == injected.name, [row.words for row in diagnosis.ranked]
     assert diagnosis.ranked[0].name == injected.name
@@ -66,7 +66,7 @@ def test_a_injected_fault_comes_first(reference, injected):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", ["the extinction 1.4 times", "upside down", "filmic", "half a pixel", "sRGB"])
-def test_a_injected_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(reference, words):
+def test_an_injected_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody_tells(reference, words):
     """The images of the test above have no noise, and it says that their pixels are centres: an engine says neither."""
     (injected,) = (each for each in INJECTED if each.words == words)
     noise = 1 + 0.01 * np.random.default_rng(6).standard_normal((SIZE[1], SIZE[0], 1))
