@@ -86,7 +86,8 @@ def sweep(
     """Run every method over many scenes: a row of numbers each.
 
     A study names scenes, methods, kernels, parameters, media and sizes; every combination is a cell and becomes one
-    row of DIR/sweep.parquet. A process for each processor computes them unless `--cluster` says otherwise.
+    row of DIR/sweep.parquet and DIR/sweep.jsonl. A process for each processor computes them unless `--cluster` says
+    otherwise.
 
     Finished rows are kept: a run that was interrupted goes on where it was, and the same study twice computes nothing
     but cells that failed, hung or aborted.
@@ -129,7 +130,10 @@ def sweep(
     variant = activate()
     with RowStore(folder) as store:
         ran = _run(chosen, store, place, variant=variant, progress=progress)
-        return replace(ran, parquet=str(store.write_parquet()) if len(store) else None)
+        if not len(store):
+            return ran
+        store.write_json()
+        return replace(ran, parquet=str(store.write_parquet()))
 
 
 def _findings(source: Path, target: Path | None) -> Said:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows on disk: a database to which finished rows are added, and the Parquet that is made of it.
+"""Rows on disk: a database to which finished rows are added, and the Parquet and JSON that are made of it.
 
 `rows.sqlite` has each row once, by its key: a row whose key is there already replaces it. A row that was added is on
 disk: a run that is killed, or whose disk is full, loses nothing that was finished. One run at a time writes.
@@ -16,7 +16,7 @@ from analytic.errors import InputError
 from reference.storage.files import atomic_path, ensure_folder
 from validation.study.row import COLUMNS, arrow_schema, property_names
 
-ROWS, PARQUET = "rows.sqlite", "sweep.parquet"  #: files of the folder of a study
+ROWS, PARQUET, JSON = "rows.sqlite", "sweep.parquet", "sweep.jsonl"  #: files of the folder of a study
 
 #: Of every configuration, so many of the worst rows by each of `_WORST_BY` keep their pictures in the Parquet.
 PICTURES = 12
@@ -117,6 +117,14 @@ class RowStore:
                     writer.write_table(pa.Table.from_pylist(batch, schema=schema))
                     batch = []
             writer.write_table(pa.Table.from_pylist(batch, schema=schema))
+        return target
+
+    def write_json(self) -> Path:
+        """Write `sweep.jsonl`, a row a line without its picture, whole or not at all, and return its path."""
+        target = self.folder / JSON
+        with atomic_path(target) as temporary, open(temporary, "w", encoding="utf-8") as file:
+            for (data,) in self._rows.execute("SELECT data FROM rows ORDER BY rowid"):
+                file.write(data + "\n")
         return target
 
     def _one(self, question: str, key: object) -> tuple[Any, ...] | None:

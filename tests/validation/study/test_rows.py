@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: a finished row is never lost and never there twice, whatever ends the process or the disk."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -92,7 +93,10 @@ def test_the_parquet_has_every_row_once_and_the_worst_pictures(tmp_path):
             store.add(row(f"{number:02d}", picture=b"new", **worst, **{"properties.depth": 1.5}))
         store.add(row("none", "refused", reason="no", seed=2**40))
         table = pq.read_table(store.write_parquet())
+        lines = store.write_json().read_text().splitlines()
     assert table["key"].to_pylist() == [*(f"{number:02d}" for number in range(count)), "none"]
+    for line, kept in zip(lines, table.drop_columns(["picture"]).to_pylist(), strict=True):
+        assert json.loads(line) == {name: value for name, value in kept.items() if value is not None}
     assert table["picture"].to_pylist() == [None] * (count - PICTURES) + [b"new"] * PICTURES + [None]
     assert table["properties.depth"].to_pylist()[-2:] == [1.5, None]
     assert table["seed"].to_pylist()[-1] == 2**40
