@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.numerics.array_types import ArrayTypes, aligned_array, four_numbers
+from realtime.numerics.array_types import ArrayTypes, aligned_array, four_numbers, types_of
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
 _FLAT = 1e-5  # length of the difference between the normals of a corner and of the triangle: float32, with room
@@ -57,10 +57,17 @@ def read_facets(scene, types: ArrayTypes) -> Facets | None:
 
 def turned_facets(facets: Facets, numbers: Collection[int], turn: NDArray[np.float64]) -> Facets:
     """Return the triangles with the normals of the shapes of some numbers turned by a matrix (3, 3)."""
-    rows, shape = (np.array(table).reshape(-1, 4) for table in (facets.normals, facets.albedos))
-    moved = np.repeat(np.isin(shape[:, 3], list(numbers)), 3 if facets.smooth else 1)
-    rows[moved, :3] = rows[moved, :3] @ turn.T
-    return replace(facets, normals=aligned_array(type(facets.normals), rows.ravel()))
+    Float = type(facets.normals)
+    Four = four_numbers(Float)
+    rotation, moved = aligned_array(Float, turn.ravel()), np.zeros(max(numbers, default=0) + 1)
+    moved[list(numbers)] = 1
+    lane = dr.arange(mi.UInt32, dr.width(facets.normals) // 4)
+    normal = dr.gather(Four, facets.normals, lane)
+    shape = mi.UInt32(dr.gather(Four, facets.albedos, lane // 3 if facets.smooth else lane).w)
+    turns = dr.gather(Float, aligned_array(Float, moved), shape, shape < len(moved)) > 0
+    rows = [dr.gather(types_of(Float).vector, rotation, k) for k in range(3)]
+    turned = Four(*(dr.dot(row, normal.xyz) for row in rows), normal.w)
+    return replace(facets, normals=dr.ravel(dr.select(turns, turned, normal)))
 
 
 def facet_number(facets: Facets, hit, active):
