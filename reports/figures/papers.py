@@ -114,11 +114,11 @@ def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
     images: dict[str, Any] = {}
     for at, (name, figure) in enumerate(scenes.items()):
         part = part_of(progress, at / len(scenes), (at + 1) / len(scenes), before=f"{name}, ")
-        pair = pair_of(shown(name, size), samples, part)
-        factor = exposure(pair.image)
-        images |= {f"{name}-collectors": pair.image, f"{name}-light-paths": pair.reference}
-        above.append((f"{figure}, {name}\ncollectors", tone_mapped(pair.image, factor)))
-        below.append((f"{figure}, {name}\nlight paths", tone_mapped(pair.reference, factor)))
+        collectors, paths, _ = pair_of(shown(name, size), samples, part)
+        factor = exposure(collectors)
+        images |= {f"{name}-collectors": collectors, f"{name}-light-paths": paths}
+        above.append((f"{figure}, {name}\ncollectors", tone_mapped(collectors, factor)))
+        below.append((f"{figure}, {name}\nlight paths", tone_mapped(paths, factor)))
     return PaperFigure(_grid([*above, *below], across=4), images)
 
 

@@ -7,26 +7,21 @@ one map; ours has a lamp that shines in all directions, so its map has six faces
 place. The light volume is the paper's mesh; its height field walked without triangles stands beside it as `walk`. The
 paper's marcher evaluates the airlight where the visibility changes.
 
-Errors are against the quadrature, at one pixel in `stride` along both axes. The passes, in wall-clock time, are those
-of `realtime.methods.light_volumes.published.mesh.tessellation_stages`, and `volume`: the rasterisation of the triangles
-and the signed sum.
+Errors are against the quadrature, at one pixel in `stride` along both axes.
 """
 
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
-from realtime.frame.renderer import Frame, FrameRenderer, render_frame, run_cast_and_shade, run_method
-from realtime.methods.light_volumes.published.mesh import tessellation_stages
+from realtime.frame.renderer import Frame, FrameRenderer, render_frame
 from realtime.scene.read_scene import Scene, read_scene
-from realtime.shadow_maps.shadow_map import cast_shadow_map
 from validation.clock import time_repeated, timed
 from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
@@ -39,7 +34,6 @@ Array = NDArray[np.float64]
 
 SIZE = (1024, 1024)  #: of the published images [pixels]
 MAPS = (1024, 2048, 4096)  #: of Table 1 [texels]
-PASSES = ("laplacian", "edge map", "tessellate", "vertices")  #: of the adaptive tessellation
 _SECONDS = 0.1  # for each timing [s]
 _LONGEST = 30.0  # frames that take longer are not measured [s]
 _MESH: dict[str, Any] = {"evaluation": "mesh"}
@@ -58,7 +52,7 @@ IMAGES: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
 
 
 def billeter_tables(size: tuple[int, int] = SIZE, maps: tuple[int, ...] = MAPS) -> dict[str, Any]:
-    """Return rates, errors, passes and numbers of triangles, at a size of the frames and of the maps of Table 1."""
+    """Return rates, errors and numbers of triangles, at a size of the frames and of the maps of Table 1."""
     return _images(size) | _table(size, maps)
 
 
@@ -127,32 +121,18 @@ def table_scene(name: str, size: tuple[int, int]) -> Any:
 
 
 def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, Any]:
-    """Return the rate of a view of Table 1, the times of its passes, and the triangles of the static mesh."""
-    named = f"{view} {tessellation}"
+    """Return the rate of a view of Table 1, and the triangles of the static mesh."""
+    static, rate, triangles = tessellation == "static", f"{view} {tessellation} fps", f"{view} triangles"
     values = {"evaluation": "mesh", "tessellation": tessellation, "map": texels}
 
     def measured() -> dict[str, Any]:
         renderer = prepared(scene, configuration("light-volumes", "exact", values))
         frame_within(renderer)
-        ready = renderer.prepare(scene)
-        cast, by_light = run_cast_and_shade(renderer)
-        dr.eval(cast, by_light)
-        volume = time_repeated(lambda: dr.eval(run_method(renderer, ready, cast, by_light)), seconds=_SECONDS, least=3)
-        found: dict[str, Any] = {f"{named} fps": _rate(renderer), f"{named} volume": volume.interval}
-        if tessellation == "static":
-            return found | {f"{view} triangles": sum(len(mesh.triangles) for of_group in ready for mesh in of_group)}
-        return found | {f"{named} {name}": time for name, time in _passes(scene, texels).items()}
+        meshes = [mesh for of_group in renderer.prepare(scene) for mesh in of_group] if static else []
+        counted = {triangles: sum(len(mesh.triangles) for mesh in meshes)} if static else {}
+        return {rate: _rate(renderer)} | counted
 
-    names = (f"{named} fps", f"{named} volume")
-    more = (f"{view} triangles",) if tessellation == "static" else tuple(f"{named} {name}" for name in PASSES)
-    return attempted((*names, *more), measured)
-
-
-def _passes(scene: Scene, texels: int) -> dict[str, float]:
-    """Return the times of the passes of the tessellation, summed over the lights [ms], medians of three."""
-    pairs = [(cast_shadow_map(scene.geometry, light, texels), light) for light in scene.lights]
-    runs = [[tessellation_stages(shadow_map, light)[0] for shadow_map, light in pairs] for _ in range(3)]
-    return {name: float(np.median([sum(times[name] for times in run) for run in runs])) for name in runs[0][0]}
+    return attempted((rate, triangles) if static else (rate,), measured)
 
 
 def frame_within(renderer: FrameRenderer) -> Frame:

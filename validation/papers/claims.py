@@ -138,32 +138,25 @@ def verdict(claim: Claim, figure: Figure) -> str:
 
 
 @dataclass(frozen=True)
-class Judged:
+class Judged(Claim):
     """A claim beside what was measured; what is not known is None."""
 
-    paper: str
-    item: str
-    words: str
-    verdict: str | None  #: of `VERDICTS`; None for a number without a direction
-    published: float | None
-    measured: float | None
-    low: float | None
-    high: float | None
-    unit: str
-    why: str
+    verdict: str | None = None  #: of `VERDICTS`; None for a number without a direction
+    measured: float | None = None
+    low: float | None = None
+    high: float | None = None
 
 
 def judged(claim: Claim, figures: Figures) -> Judged:
-    """Return a claim beside what was measured."""
+    """Return a claim beside what was measured; `why` says why there is no figure, or by which rule it is judged."""
     figure = taken(claim, figures) if claim.experiment else claim.why
-    value, low, high = (None, None, None) if isinstance(figure, str) else figure
-    row = Judged(claim.paper, claim.item, claim.words, None, claim.published, value, low, high, claim.unit, claim.why)
+    row = Judged(**vars(claim))
     if isinstance(figure, str):
         return replace(row, verdict=IMPOSSIBLE if claim.direction or not claim.experiment else None, why=figure)
+    value, low, high = figure
+    row = replace(row, measured=value, low=low, high=high)
     if not claim.direction:
         return row
     found = verdict(claim, figure)
-    why = f"{claim.rule}: {claim.why}"
-    if found == IMPOSSIBLE:
-        why = f"cannot be told apart, the figure lies between {figure[1]:.3g} and {figure[2]:.3g}; {why}"
-    return replace(row, verdict=found, why=why)
+    apart = f"cannot be told apart, the figure lies between {low:.3g} and {high:.3g}; " if found == IMPOSSIBLE else ""
+    return replace(row, verdict=found, why=f"{apart}{claim.rule}: {claim.why}")

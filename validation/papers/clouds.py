@@ -11,7 +11,6 @@
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import drjit as dr
@@ -53,36 +52,28 @@ _SURE = 2.0  #: standard errors to both sides of a mean
 WARM: Mapping[str, Any] = {"start": "previous", "iterations": 3, "settled": 0.05}
 
 
-@dataclass(frozen=True)
-class Pair:
-    """The method and the reference of one scene, (height, width, 3) [W/(m^2 sr)]."""
-
-    image: Array
-    reference: Array
-    error: Array  #: standard error of the reference
-
-    def ratio(self, where: NDArray[np.bool_]) -> list[float]:
-        """Return the light of the image over that of the reference in some pixels, with the ends of its interval."""
-        light, expected = self.image[where].sum(), self.reference[where].sum()
-        # Errors of colours of one pixel come from the same paths; they are added, not their squares.
-        spread = _SURE * np.sqrt((self.error[where].sum(-1) ** 2).sum())
-        return [float(light / at) for at in (expected, expected + spread, expected - spread)]
-
-
 def clouds_figures() -> dict[str, Any]:
     """Return light over that of the reference in Figs 11 and 12, and what shaded surfaces of Fig. 11a lack [%]."""
     every = np.ones(SIZE[::-1], dtype=bool)
-    figures: dict[str, Any] = {name: pair_of(shown(name, SIZE), SAMPLES).ratio(every) for name in RESULTS}
+    figures: dict[str, Any] = {name: _ratio(*pair_of(shown(name, SIZE), SAMPLES), every) for name in RESULTS}
     fewer = SAMPLES // _FEWER
     loaded = shown(GAP, SIZE)
     pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(SIZE[::-1])
-    figures["gap, shaded"] = pair.ratio(shaded)
-    part = 100 * float(pair.reference[shaded].sum() / pair.reference.sum())
+    figures["gap, shaded"] = _ratio(*pair, shaded)
+    part = 100 * float(pair[1][shaded].sum() / pair[1].sum())
     figures["gap, lost"] = [part * (1 - ratio) for ratio in (figures["gap, shaded"][place] for place in (0, 2, 1))]
     loaded = shown(LOBES, SIZE)
     two = _two_collectors(loaded)
-    figures["lobes, two"] = pair_of(loaded, fewer).ratio(two) if two.any() else "no pixel has two collectors"
+    figures["lobes, two"] = _ratio(*pair_of(loaded, fewer), two) if two.any() else "no pixel has two collectors"
     return figures
+
+
+def _ratio(image: Array, reference: Array, error: Array, where: NDArray[np.bool_]) -> list[float]:
+    """Return the light of an image over that of the reference in some pixels, with the ends of its interval."""
+    light, expected = image[where].sum(), reference[where].sum()
+    # Errors of colours of one pixel come from the same paths; they are added, not their squares.
+    spread = _SURE * np.sqrt((error[where].sum(-1) ** 2).sum())
+    return [float(light / at) for at in (expected, expected + spread, expected - spread)]
 
 
 def cloud_frames() -> dict[str, Any]:
@@ -121,12 +112,15 @@ def shown(name: str, size: tuple[int, int]) -> LoadedScene:
     return loaded
 
 
-def pair_of(loaded: LoadedScene, samples: int, progress: Progress | None = None) -> Pair:
-    """Return a scene by the method and by light paths, so many a pixel."""
+def pair_of(loaded: LoadedScene, samples: int, progress: Progress | None = None) -> tuple[Array, Array, Array]:
+    """Return a scene by the method, by light paths, so many a pixel, and their standard error [W/(m^2 sr)]."""
     frame = render_frame(frame_renderer(read_scene(loaded.scene), METHODS[_METHOD]))
     traced = monte_carlo_reference(loaded, "cloud-paths", budget=Budget(samples=samples), progress=progress).image
-    layers = (frame.airlight, traced.layers["airlight"], traced.layers["airlight_se"])
-    return Pair(*(np.array(layer, dtype=np.float64) for layer in layers))
+    method, paths, error = (
+        np.array(layer, dtype=np.float64)
+        for layer in (frame.airlight, traced.layers["airlight"], traced.layers["airlight_se"])
+    )
+    return method, paths, error
 
 
 def _shaded(clouds: CloudScene) -> NDArray[np.bool_]:

@@ -13,7 +13,6 @@ import pytest
 from realtime.scene.read_scene import read_scene
 from validation.kernels.rays import wide_rays
 from validation.papers import billeter_tables, biri_tables, soft_shafts
-from validation.papers.biri_tables import STAGES, fractions
 from validation.papers.claims import (
     DIRECTIONS,
     EFFORTS,
@@ -30,7 +29,6 @@ from validation.papers.formulas import _annex, _cloud_equations, _droplets, prin
 from validation.papers.scattering import fitted_constant, left_over
 from validation.papers.shadow_planes import drawn
 from validation.scenes.loading import load_scene
-from validation.timing import Timing
 
 MEASURED = json.loads(Path(__file__).with_name("figures.json").read_text(encoding="utf-8"))
 JUDGED = [claim for claim in claims() if claim.direction]
@@ -146,17 +144,6 @@ def test_printed_formulas_by_hand():
     assert clouds["eq. 1"] == pytest.approx(-(1 + (4.0 - 11.0) / (19.0 - 3.0)))
     light = _droplets()
     assert light["peak"] + light["lobe"] == pytest.approx(light["forward"])
-
-
-def test_fractions_of_stages_have_intervals():
-    """Five works of 1, 2, 3, 5 and 13 ms, each 10 % sure: planes take 13 - 3, sorting 5 - 1 ms of 20."""
-    times = [Timing(ms, 0.9 * ms, 1.1 * ms, 5) for ms in (1.0, 2.0, 3.0, 5.0, 13.0)]
-    found = fractions(times)
-    assert [found[name][0] for name in STAGES] == pytest.approx([100 * ms / 20 for ms in (1, 2, 3, 4, 10)])
-    low, high = found["planes"][1:]
-    assert low == pytest.approx(100 * 8.4 / (8.4 + 1.1 + 2.2 + 3.3 + (5.5 - 0.9)))
-    assert high == pytest.approx(100 * 11.6 / (11.6 + 0.9 + 1.8 + 2.7 + (4.5 - 1.1)))
-    assert found["main cost"][0] == pytest.approx(2.5)
 
 
 def test_the_penumbra_leaves_out_what_sees_all_of_the_light(variant):

@@ -16,7 +16,6 @@ volume. Faces of a cube that look along a negative axis are mirrored: there the 
 """
 
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -64,31 +63,6 @@ def memory_needed(faces: int, size: int) -> int:
     distance, and its numbers (one of 32, one of 64 bits).
     """
     return faces * (size + 1) ** 2 * (4 * 8 + 6 * 4 + 2 * 4 + 4 + 8)
-
-
-def tessellation_stages(
-    shadow_map: ShadowMap, light: Light, threshold: float = THRESHOLD
-) -> tuple[dict[str, float], VolumeMesh]:
-    """Return the time of each pass of an adaptive tessellation [ms], and its mesh.
-
-    The passes are those of the paper's Table 1, ``laplacian``, ``edge map`` and ``tessellate``, and ``vertices``, which
-    a graphics card does while it draws.
-
-    Raises InputError if `threshold` is not a positive number.
-    """
-    passed: list[Any] = [_heights(shadow_map)]
-    times = {}
-    stages = {
-        "laplacian": lambda height: edges(height, threshold),
-        "edge map": divide,
-        "tessellate": triangles,
-        "vertices": lambda corners: adaptive_mesh(shadow_map, light, passed[0], corners),
-    }
-    for name, stage in stages.items():
-        start = perf_counter()
-        passed.append(stage(passed[-1]))
-        times[name] = 1e3 * (perf_counter() - start)
-    return times, passed[-1]
 
 
 def _heights(shadow_map: ShadowMap):
