@@ -4,6 +4,7 @@
 A reader returns the value, or raises InputError with what was given and what is wanted.
 """
 
+import csv
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -22,6 +23,21 @@ def read_toml(what: str, path: Path) -> dict[str, Any]:
         raise InputError(f"{what}: there is no file {path}; wanted a TOML file, see docs/many-scenes.md") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{what} {path}: it cannot be read: {error}") from error
+
+
+def read_csv(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the rows of a CSV file with the numbers of their lines; empty lines and those that begin with # go."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(cells)]
+    except (OSError, UnicodeDecodeError, csv.Error) as reason:
+        raise InputError(f"{path} cannot be read as a CSV file: {reason}; give a text file") from None
+    rows = [(line, cells) for line, cells in rows if not cells[0].startswith("#")]
+    for line, cells in rows[1:]:
+        if len(cells) != len(rows[0][1]):
+            raise InputError(f"{path}, line {line}: {len(cells)} cells in a file of {len(rows[0][1])} columns")
+    return rows
 
 
 def read_table(what: str, value: Any) -> Mapping[str, Any]:

@@ -10,12 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from analytic.errors import InputError
 from reports.api.inputs import Progress, Words, one_error, several, telling
 from reports.studies.result import Study
-from reports.tables.table import Column, Table, numbers, table, table_of, words
-from validation.columns import columns_of, plain
+from reports.tables.table import Column, Table, numbers, table, words
 
 if TYPE_CHECKING:
-    from validation.slab.light import SlabNumbers
-
     Depths: TypeAlias = Sequence[float] | str | None
     Directions: TypeAlias = Sequence[tuple[float, float]] | str
 else:
@@ -108,56 +105,61 @@ def slab(
         )
     with telling(progress, "slab") as tell:
         found = slab_numbers(request, photons=int(photons), progress=tell)
-    total, error = found.total, found.error.total
+    words_of = {
+        side: f"{found['total'][side]:.7g} +- {found['error']['total'][side]:.1g}"
+        for side in ("reflectance", "transmittance")
+    }
     said = (
-        f"All orders: reflectance {total.reflectance:.7g} +- {error.reflectance:.1g}, transmittance "
-        f"{total.transmittance:.7g} +- {error.transmittance:.1g} (with the light that was never scattered)."
+        f"All orders: reflectance {words_of['reflectance']}, transmittance {words_of['transmittance']} (with the light "
+        "that was never scattered)."
     )
-    data = plain(found)
     return SlabStudy(
         name="slab",
-        data=data,
+        data=found,
         tables=tuple(_slab_tables(found)),
         lines=(said,),
-        rows=tuple(data["orders"]),
+        rows=tuple(found["orders"]),
         draw=partial(_draw_slab, found),
     )
 
 
-def _slab_tables(found: "SlabNumbers") -> Iterator[Table]:
-    from validation.slab.light import Flux, OrderLight, Radiance
+_EXITS = {f"{side}_{kind}": kind for side in ("reflected", "transmitted") for kind in ("mean", "rms")}
+_BY_ORDER = {"reflectance": "reflected", "transmittance": "transmitted", **_EXITS}
 
-    six = {"digits": 6}
 
-    def shown(title: str, record: type, rows: Sequence[Any], digits: int = 6) -> Table:
-        return table_of(title, record, rows, how={each.key: {"digits": digits} for each in columns_of(record)})
+def _slab_tables(found: Mapping[str, Any]) -> Iterator[Table]:
+    def by_order(title: str, rows: Sequence[Any], digits: int = 6) -> Table:
+        columns = (*words("orders"), *numbers(**_BY_ORDER, how={"digits": digits}))
+        return table(title, columns, [{name: row[name] for name in ("orders", *_BY_ORDER)} for row in rows])
 
-    yield shown("By order; lengths in mean free paths", OrderLight, found.orders)
-    if found.photons:
-        yield shown(f"By {found.photons.count} photons", OrderLight, found.photons.orders)
-        yield shown("Standard errors of the photons", OrderLight, found.photons.standard_error.orders, 2)
-    fluence = [{"orders": row.orders, **vars(each)} for row in found.orders for each in row.fluence]
+    six: Mapping[str, Any] = {"digits": 6}
+    photons, total = found["photons"], found["total"]
+    yield by_order("By order; lengths in mean free paths", found["orders"])
+    if photons:
+        yield by_order(f"By {photons['count']} photons", photons["orders"])
+        yield by_order("Standard errors of the photons", photons["standard_error"]["orders"], 2)
+    fluence = [{"orders": row["orders"], **each} for row in found["orders"] for each in row["fluence"]]
     if fluence:
         columns = (*words("orders"), *numbers("depth", "value", "mean", "rms", how=six))
         yield table("Fluence for unit flux across the beam", columns, fluence)
-    total = found.total
-    if total.flux:
-        yield shown("Diffuse flux of all orders for a flux of pi across the beam", Flux, total.flux)
-    if total.radiance:
-        title = "Radiance of all orders for a flux of pi across the beam"
-        columns = (*shown(title, Radiance, ()).columns, Column("error", "error", digits=2))
-        errors = found.error.total.radiance
-        yield table(title, columns, [{**vars(row), "error": e.value} for row, e in zip(total.radiance, errors)])
+    if total["flux"]:
+        title = "Diffuse flux of all orders for a flux of pi across the beam"
+        yield table(title, numbers("depth", "up", "down", how=six), total["flux"])
+    if total["radiance"]:
+        columns = (*numbers("depth", "mu", "phi", "value", how=six), Column("error", "error", digits=2))
+        errors = found["error"]["total"]["radiance"]
+        rows = [{**row, "error": e["value"]} for row, e in zip(total["radiance"], errors)]
+        yield table("Radiance of all orders for a flux of pi across the beam", columns, rows)
 
 
-def _draw_slab(found: "SlabNumbers", column: str) -> Any:
+def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
     """Return what leaves a slab by order, and how far from the entry, computed and by photons."""
     import numpy as np
 
     from reports.plotting.figure import new_figure
     from reports.plotting.style import COLOURS, WIDTHS, reference_style
 
-    rows, walked = found.orders, found.photons
+    rows, walked = found["orders"], found["photons"]
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.5 * width)
     fractions, lengths = figure.subplots(*((1, 2) if double else (2, 1)))
@@ -165,12 +167,12 @@ def _draw_slab(found: "SlabNumbers", column: str) -> Any:
     dots = reference_style() | {"linestyle": "none", "marker": "o", "markersize": 2.5}
 
     def values(of: Any, name: str) -> Any:
-        return np.array([np.nan if getattr(row, name) is None else getattr(row, name) for row in of], dtype=float)
+        return np.array([np.nan if row[name] is None else row[name] for row in of], dtype=float)
 
     def put(panel: Any, name: str, at: Any, label: str | None = None) -> None:
         if walked:
-            errors = 2 * np.nan_to_num(values(walked.standard_error.orders, name))
-            panel.errorbar(at, values(walked.orders, name), errors, capsize=2, label=label, **dots)
+            errors = 2 * np.nan_to_num(values(walked["standard_error"]["orders"], name))
+            panel.errorbar(at, values(walked["orders"], name), errors, capsize=2, label=label, **dots)
 
     for number, (name, side, colour) in enumerate(_SIDES):
         at = places + 0.4 * number - 0.2
@@ -181,7 +183,7 @@ def _draw_slab(found: "SlabNumbers", column: str) -> Any:
             lengths.plot(places, values(rows, key), style, color=COLOURS[colour], label=f"{side}, {kind}")
             put(lengths, key, places)
     for panel in (fractions, lengths):
-        panel.set_xticks(places, [row.orders for row in rows], rotation=45)
+        panel.set_xticks(places, [row["orders"] for row in rows], rotation=45)
         panel.set_xlabel("order of scattering")
         panel.legend()
     fractions.set_ylabel("fraction of the light [1]")

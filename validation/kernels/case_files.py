@@ -10,7 +10,6 @@ Two sets of columns are known, each in any order and beside others:
 be missing. An x1 of `inf` is a ray that never ends.
 """
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -24,6 +23,7 @@ from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction, phase_from_words
+from validation.readers import read_csv
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,9 @@ def read_cases(path: str | Path) -> Cases:
     cannot be read, a missing column, a word where a number belongs, a number out of its range or an unknown phase
     function: the message names file, line (from 1, the header) and column.
     """
-    header, lines = _read_text(Path(path))
+    (_, header), *lines = read_csv(Path(path)) or [(1, [])]
+    if not lines:
+        raise InputError(f"{path} has {'a header only' if header else 'no lines'}; wanted a header and cases")
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
     rows = tuple(zip(*columns.values(), strict=True))
     return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)), rows)
@@ -238,22 +240,3 @@ def _coordinates(key: str, values: Any, name: str) -> dict[str, Array]:
     if vectors.ndim == 0 or vectors.shape[-1] != 3:
         raise InputError(f"{name}, column '{key}': got an array of shape {vectors.shape}, wanted (..., 3)")
     return {letter: vectors[..., number] for number, letter in enumerate(_VECTORS[key])}
-
-
-def _read_text(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the header and the lines with cells, each with its number in the file."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            lines = [(reader.line_num, cells) for cells in reader if cells]
-    except (OSError, UnicodeDecodeError, csv.Error) as reason:
-        raise InputError(f"{path} cannot be read as a CSV file: {reason}; give a text file with a header") from None
-    if len(lines) < 2:
-        raise InputError(f"{path} has {'no lines' if not lines else 'a header only'}; wanted a header and cases")
-    header = [cell.strip() for cell in lines[0][1]]
-    for number, cells in lines[1:]:
-        if len(cells) != len(header):
-            raise InputError(
-                f"{path}, line {number}: {len(cells)} cells under a header of {len(header)} columns; write one for each"
-            )
-    return header, lines[1:]

@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The numbers of a slab by name, as the command prints them: deterministic with their errors, and by photons.
+"""The numbers of a slab by name, as JSON has them: deterministic with their errors, and by photons.
+
+    {"tau", "sun", "albedo", "phase", **light, "error": light, "photons": None or {"count", "seed", **light,
+     "standard_error": light}}
+    light = {"orders": [{"orders", "reflectance", "transmittance", "reflected_mean", "reflected_rms",
+                         "transmitted_mean", "transmitted_rms", "fluence": [{"depth", "value", "mean", "rms"}]}],
+             "total": {"reflectance", "transmittance", "flux": [{"depth", "up", "down"}],
+                       "radiance": [{"depth", "mu", "phi", "value"}]}}
+
+Of `error` and `standard_error` each number is that of the same number of the light.
 
 The computation runs twice, the second time with three quarters of the streams and two nodes fewer in each panel of
 depth. The change is the error that is printed: it is that of the coarser run, so the printed numbers are better.
@@ -14,7 +23,6 @@ light. The spread of one axis about the mean, the sigma of Bouthors 2008, is sqr
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +31,7 @@ from numpy.typing import NDArray
 from realtime.clouds.slab_orders.phases import SlabPhase
 from reference.monte_carlo.slab_walk.estimates import ExitEstimate, SlabEstimate, slab_estimate
 from reference.monte_carlo.slab_walk.walk import Slab
-from validation.columns import column, record_of
+from validation.columns import plain
 from validation.slab.moments import SlabOrders, order_sets
 from validation.slab.radiance import slab_radiance
 from validation.slab.request import SlabRequest
@@ -41,95 +49,10 @@ _GIVEN = ("orders", "depth", "mu", "phi")
 _SCATTERING = 0.4e-6
 
 
-Number = float | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fluence:
-    """The fluence at a depth."""
-
-    depth: float
-    value: Number
-    mean: Number
-    rms: Number
-
-
-@dataclass(frozen=True, kw_only=True)
-class OrderLight:
-    """The light of some orders of scattering."""
-
-    orders: str
-    reflectance: Number = column("reflected")
-    reflected_mean: Number = column("mean")
-    reflected_rms: Number = column("rms")
-    transmittance: Number = column("transmitted")
-    transmitted_mean: Number = column("mean")
-    transmitted_rms: Number = column("rms")
-    fluence: tuple[Fluence, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Flux:
-    """The diffuse flux at a depth."""
-
-    depth: float
-    up: Number
-    down: Number
-
-
-@dataclass(frozen=True, kw_only=True)
-class Radiance:
-    """The radiance at a depth, in a direction."""
-
-    depth: float
-    mu: float
-    phi: float  #: [degrees]
-    value: Number
-
-
-@dataclass(frozen=True, kw_only=True)
-class TotalLight:
-    """The light of all orders."""
-
-    reflectance: Number
-    transmittance: Number
-    flux: tuple[Flux, ...]
-    radiance: tuple[Radiance, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class SlabLight:
-    """The light of a slab, or the error of each of its numbers."""
-
-    orders: tuple[OrderLight, ...]
-    total: TotalLight
-
-
-@dataclass(frozen=True, kw_only=True)
-class PhotonLight(SlabLight):
-    """The light of a slab by photons."""
-
-    count: int
-    seed: int
-    standard_error: SlabLight
-
-
-@dataclass(frozen=True, kw_only=True)
-class SlabNumbers(SlabLight):
-    """All numbers of a slab."""
-
-    tau: float
-    sun: float
-    albedo: float
-    phase: str
-    error: SlabLight  #: the estimated error of every number
-    photons: PhotonLight | None = None  #: that check them
-
-
 def slab_numbers(
     request: SlabRequest, *, photons: int = 0, seed: int = 0, progress: Progress | None = None
-) -> SlabNumbers:
-    """Return all numbers of a slab."""
+) -> dict[str, Any]:
+    """Return all numbers of a slab, see the module; None where nothing is known, such as the mean place of no light."""
     tell = progress or (lambda fraction, what: None)
     tell(0.0, "orders")
     streams = needed_streams(request.phase.deterministic)
@@ -139,6 +62,7 @@ def slab_numbers(
         "phase": request.phase.name,
         **numbers,
         "error": _differences(numbers, others),
+        "photons": None,
     }
     if photons:
         slab = Slab(request.tau, request.mu0, request.albedo, request.phase.sampled(), request.depths)
@@ -150,7 +74,8 @@ def slab_numbers(
             "standard_error": _estimated(request, estimate, "error"),
         }
     tell(1.0, "done")
-    return record_of(record, SlabNumbers)
+    found: dict[str, Any] = plain(record)
+    return found
 
 
 def expected_seconds(request: SlabRequest, photons: int) -> float:
@@ -228,6 +153,7 @@ def _estimated(request: SlabRequest, estimate: SlabEstimate, field: str) -> dict
             {"depth": depth, "up": getattr(up, field), "down": getattr(down, field)}
             for depth, up, down in zip(request.depths, estimate.up, estimate.down, strict=True)
         ],
+        "radiance": [],
     }
     return {"orders": orders, "total": total}
 

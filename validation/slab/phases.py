@@ -21,6 +21,7 @@ from realtime.droplets import CUT, droplet_series
 from realtime.scene.phase import HgDraine
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
 from reference.monte_carlo.slab_walk.walk import Scattering
+from validation.readers import read_csv
 
 Array = NDArray[np.float64]
 
@@ -113,13 +114,7 @@ def _mean_cosine(name: str) -> float:
 
 def read_phase_file(path: Path) -> tuple[Array, Array]:
     """Return angles [rad] and values of a CSV file."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-        raise InputError(f"{path}: {reason}; wanted a CSV file of angles [degrees] and values") from None
-    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
-    rows = [(number, line.split(",")) for number, line in lines if line and not line.startswith("#")]
+    rows = read_csv(path)
     if rows and not _is_number(rows[0][1][0]):
         rows = rows[1:]
     for number, cells in rows:

@@ -328,7 +328,7 @@ def test_both_files(data_folder):
             "line 2, column 'phase': no phase function is called 'hazi'; did you mean 'hazy'",
         ),
         (HEAD + "tabulated,0,1,1,0,1,0.1\n", "no place for its table"),
-        (HEAD + "hazy,0,1,1,0,1\n", "line 2: 6 cells under a header of 7 columns"),
+        (HEAD + "hazy,0,1,1,0,1\n", "line 2: 6 cells in a file of 7 columns"),
         ("", "no lines"),
         (
             "phase,ox,oy,oz,dx,dy,dz,lx,ly,lz,x0,x1,sigma_t\nhazy,0,0,0,0,0,2,1,1,1,0,1,0.1\n",

@@ -8,7 +8,6 @@ import pytest
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from tests.helpers.hg_draine import hg_draine_moments
-from validation.columns import plain
 from validation.slab.light import slab_numbers
 from validation.slab.phases import phase_pair, read_phase_file
 from validation.slab.request import slab_request
@@ -29,8 +28,8 @@ def paired(first, second, errors):
 
 def compared(tau, sun, phase, photons, **more):
     numbers = slab_numbers(slab_request(tau, sun, phase=phase, **more), photons=photons, seed=5)
-    walked = numbers.photons
-    triples = list(paired(*map(plain, (numbers, walked, walked.standard_error))))
+    walked = numbers["photons"]
+    triples = list(paired(numbers, walked, walked["standard_error"]))
     return numbers, np.array([(second - first) / error for first, second, error in triples])
 
 
@@ -48,8 +47,8 @@ def test_orders_are_those_of_photons(tau, sun, phase, albedo):
     assert np.abs(z).max() < 4.5
     assert 0.3 < (z**2).mean() < 2.5
     assert len(z) > 60
-    errors = numbers.photons.standard_error.orders
-    assert errors[0].reflectance < 0.01 * numbers.orders[0].reflectance
+    errors = numbers["photons"]["standard_error"]["orders"]
+    assert errors[0]["reflectance"] < 0.01 * numbers["orders"][0]["reflectance"]
 
 
 @pytest.mark.statistical
@@ -87,10 +86,10 @@ def test_a_table_of_a_function_is_the_function(tmp_path):
         slab_numbers(slab_request(2.0, 30.0, phase=name, albedo=0.9, orders="1,2", directions="-0.5:20"))
         for name in (str(path), "hg:0.75")
     )
-    assert tabulated.phase == str(path)
+    assert tabulated["phase"] == str(path)
     for name in ("reflectance", "transmitted_rms"):
-        assert getattr(tabulated.orders[1], name) == pytest.approx(getattr(exact.orders[1], name), rel=1e-4)
-    ours, theirs = (each.total.radiance[-1].value for each in (tabulated, exact))
+        assert tabulated["orders"][1][name] == pytest.approx(exact["orders"][1][name], rel=1e-4)
+    ours, theirs = (each["total"]["radiance"][-1]["value"] for each in (tabulated, exact))
     assert ours == pytest.approx(theirs, rel=1e-4)
     _, z = compared(2.0, 30.0, str(path), 20_000, orders="1,2-inf")
     assert np.abs(z).max() < 4.5
@@ -139,12 +138,12 @@ def test_hard_cases_have_finite_numbers(tau, sun):
     numbers = slab_numbers(
         slab_request(tau, sun, phase="hg:0.85", orders="1,2-3,4-inf", directions="1:0,-1:0,0.001:180,-1e-6:0")
     )
-    values = [value for value, _, _ in paired(*map(plain, (numbers, numbers, numbers.error)))]
+    values = [value for value, _, _ in paired(numbers, numbers, numbers["error"])]
     assert values
     assert np.all(np.isfinite(values))
-    total = numbers.total
-    assert total.reflectance + total.transmittance == pytest.approx(1, abs=1e-8)
-    assert all(row.value >= 0 for row in total.radiance)
+    total = numbers["total"]
+    assert total["reflectance"] + total["transmittance"] == pytest.approx(1, abs=1e-8)
+    assert all(row["value"] >= 0 for row in total["radiance"])
 
 
 TAU, SUN, G, ALBEDO = 1.5, 50.0, 0.5, 0.9
@@ -201,6 +200,6 @@ def test_orders_are_those_of_volpath(variant, side):
     numbers = slab_numbers(slab_request(TAU, SUN, phase=f"hg:{G}", albedo=ALBEDO, orders=orders))
     for order, values in zip(orders, by_order, strict=True):
         error = values.std(ddof=1) / np.sqrt(_SEEDS)
-        expected = getattr(numbers.orders[order - 1], side)
+        expected = numbers["orders"][order - 1][side]
         assert values.mean() == pytest.approx(expected, abs=4.5 * error), order
         assert error < 0.01 * expected
