@@ -16,8 +16,8 @@ f); single scattering has P/(1 - a f) with that density (TMS), so that nothing i
 the f of the phase function, `half` the printed 0.5, `full` cuts nothing: only then the sets hold the orders of the
 medium as it is.
 
-Of each cloud a ray shows what leaves at the first entry; where it leaves a cloud and enters it again, the slab of the
-first entry stands for both.
+For each cloud, a ray shows the light that leaves at its first entry; if the ray enters the same cloud again, the slab
+of the first entry stands for both.
 
 References
 ----------
@@ -174,7 +174,7 @@ class Filling:
 
 @dataclass(frozen=True)
 class CloudState:
-    """What frames need of clouds and suns."""
+    """The clouds, and the maps and searches of the suns."""
 
     surfaces: CloudSurfaces
     maps: tuple[LightMap | None, ...]  #: by light, None for a sky that is no beam

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Octaves: many orders of scattering as single scattering that is extinguished less and less, what engines do.
+r"""Octaves: multiple scattering as single scattering with less and less extinction, as in game engines.
 
-Light that was scattered more often comes in with less extinction and from more directions. So octave n is light of one
-scattering, the depth of its segment times a^n, its amount times b^n, the mean cosine of its phase function times c^n:
+Light that was scattered more often arrives with less extinction and from more directions. Octave n is therefore single
+scattering with the optical depth of the shadow segment times a^n, the radiance times b^n, and the mean cosine of the
+phase function times c^n:
 
     L = sum_{n < N} b^n w E/(4 pi) int kappa P_n(cos) exp(-tau(x) - a^n l(x)) dx.
 
 Wrenninge 2013 halves all three with every octave; Hillaire 2016 leaves a, b and c to the artist and asks for b <= a, so
-that no octave makes light. Octave 0 is single scattering, with the phase function of the scene; the others have that of
-Henyey and Greenstein with c^n times its mean cosine. Their light belongs to no order: for errors by order, octave n
-counts as the order n + 1, which it stands for.
+that no octave creates light. Octave 0 is single scattering with the phase function of the scene; the others use the
+Henyey-Greenstein function with c^n times the mean cosine of the scene's. Errors by order of scattering count octave n
+as the order n + 1, which it stands for.
 """
 
 import math
@@ -99,7 +100,7 @@ class CloudOctaves(Method):
 
 @dataclass(frozen=True)
 class OctaveState:
-    """What a frame needs beside the scene; constants are arrays, so that others need no new recording."""
+    """The state of all lights; constants are arrays, so that other values need no new recording."""
 
     surfaces: CloudSurfaces
     extinction: Any

@@ -3,7 +3,7 @@
 
 Two spacings of the same number of steps:
 
-* `uniform` in the distance x, weight dx exp(-sigma_t (x + r)) p / r^2. What most shaders do; it misses the peak near
+* `uniform` in the distance x, weight dx exp(-sigma_t (x + r)) p / r^2. Most shaders do this; it misses the peak near
   the light. Where nothing ends the ray it stops at 20 optical depths (e^-20 = 2e-9 is left).
 * `equiangular` in theta, the angle at the light; for a light at infinity these are equal steps in x. With x = foot + h
   tan theta, dx / r^2 = dtheta / h: the peak is gone and the weight is dtheta/h exp(-sigma_t (x + r)) p.

@@ -35,11 +35,11 @@ class Unshadowed(Method):
     """Airlight as if nothing cast a shadow.
 
     Valid for any scene without occluders between a light and a visible part of the medium; elsewhere it shows how much
-    light the volumetric shadows take away. Bounded media have nodes of their own, but for a polynomial kernel.
+    light the volumetric shadows take away. Bounded media have their own nodes, except for a polynomial kernel.
 
     References
     ----------
-    Biri, Arques, Michelin 2006, eq. 2. Sun, Ramamoorthi, Narasimhan, Nayar 2005. Of other forms see the module.
+    Biri, Arques, Michelin 2006, eq. 2. Sun, Ramamoorthi, Narasimhan, Nayar 2005. The module cites the other forms.
     """
 
     name = "unshadowed"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A user's own method, named 'module:function' or 'path/to/file.py:function'.
 
-What the function takes decides: a keyword `kernel` means that it calls one, other keywords are parameters and their
-defaults give them their types. What it returns is checked, because nobody else has. See docs/your-method.md.
+The signature of the function decides: a keyword `kernel` means that it calls a kernel; other keywords are parameters,
+with the types of their defaults. The result is checked, because nothing else checks it. See docs/your-method.md.
 
 It is not frozen unless its author says that it can be: a frozen function that copies NumPy's arrays in or reads values
 out ends the process (Dr.Jit 1.5). Tracing `unshadowed` again for every frame costs 0.3 ms (2 threads).

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a user's own method returned, made a colour for every pixel or refused."""
+"""The result of a user method, converted to a colour for every pixel or refused."""
 
 from dataclasses import replace
 from typing import Any
@@ -20,10 +20,10 @@ def checked_radiance(returned: Any, view: View, name: str):
     Parameters
     ----------
     returned
-        What the method `name` returned: a Dr.Jit colour, three-vector or number, or an array (pixels, 3) or (pixels,)
+        The result of the method `name`: a Dr.Jit colour, three-vector or number, or an array (pixels, 3) or (pixels,)
         of another kind, which goes through NumPy; one entry per pixel of `view`, or one for all.
     view
-        What the method was given.
+        The view that the method was given.
     name
         The method's name, for messages.
 
@@ -48,9 +48,9 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
     Parameters
     ----------
     returned
-        What the method `name` returned.
+        The result of the method `name`.
     view
-        What it was given.
+        The view that it was given.
     name
         Its name, for messages.
     visibility

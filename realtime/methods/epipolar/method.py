@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One-dimensional min/max mipmaps in epipolar slices: lit intervals by steps of 2^k texels of a shadow map.
 
-All rays of an epipolar slice see the same line of the shadow map. So a binary tree of the bounds along it, one for each
-slice, tells a ray at once of long intervals that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011).
-Airlight is computed at samples of the slices, at regular distances and at breaks of the depth, and interpolated to the
-pixels (Engelhardt and Dachsbacher 2010; Yusov 2013).
+All rays of an epipolar slice see the same line of the shadow map. A binary tree of the bounds along this line, one for
+each slice, finds long intervals that are lit or dark as a whole (Chen, Baran, Durand, Jarosz 2011). Airlight is
+computed at samples of the slices, at regular distances and at breaks of the depth, and interpolated to the pixels
+(Engelhardt and Dachsbacher 2010; Yusov 2013).
 
-Three things differ from what is published, all to the good of the method: each lit interval is integrated by a kernel
-and not marched; a leaf of the tree is linear and not constant, see `realtime.methods.epipolar.min_max_tree`; and what
-is interpolated is not the airlight but the fraction of it that is lit: the published scenes are lit by the sun, and
-near a point light the airlight itself goes as 1 / distance, and as the phase function. A fraction lies between 0 and 1,
-so no pixel between samples is brighter than it is without shadows.
+Three things differ from the publications, all in favour of the method. A kernel integrates each lit interval, with no
+marching. A leaf of the tree is linear instead of constant, see `realtime.methods.epipolar.min_max_tree`. And pixels
+interpolate the lit fraction of the airlight instead of the airlight: the published scenes are lit by the sun, but near
+a point light the airlight varies as 1 / distance and with the phase function. A fraction lies between 0 and 1, so no
+pixel between samples is brighter than without shadows.
 
-The sampling is no wrapper around other methods, as `realtime.frame.adaptive_sampling` is. Slices are cut for one light
-and hold its tree, by which samples and pixels alike are walked, and samples lie between the centres of pixels.
+The sampling does not wrap other methods, as `realtime.frame.adaptive_sampling` does: slices are cut for one light and
+hold its tree, which samples and pixels alike descend, and samples lie between the centres of pixels.
 """
 
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ _NEXT = 6.0  #: pixels from the image of a light within which nothing is interpo
 
 @dataclass(frozen=True)
 class EpipolarMap:
-    """What the method needs beyond the view, for one light."""
+    """The state of one light."""
 
     shadow_map: ShadowMap
     heights: PerMetre  #: inverse planar depths at the corners of its texels [1/m]

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a light sees of epipolar slices: one-dimensional height maps, and binary trees of their bounds.
+"""The surfaces that a light sees in epipolar slices: one-dimensional height maps, and binary trees of their bounds.
 
 In the plane of a slice (`realtime.methods.epipolar.slices`) the light is at the origin, the camera at (D, 0). The
-directions from the light are taken along a polygonal line k(q): of a point light the corners (1, 0), (0, 1), (-1, 0),
-so that it is seen all round; of a spot the chord between the two ends of its cone in the slice. A point is P = k / s;
-with k linear along an edge of the line, (q, s) are projective coordinates and a camera ray is straight in them
+directions from the light are taken along a polygonal line k(q): for a point light the one with the corners (1, 0), (0,
+1), (-1, 0), which goes all round; for a spot the chord between the two ends of its cone in the slice. A point is P = k
+/ s; with k linear along an edge of the line, (q, s) are projective coordinates and a camera ray is straight in them
 (`realtime.shadow_maps.projection` has the same with one dimension more).
 
-Of a light at infinity a slice holds parallel rays, at distances Y from the axis e1 through the camera, between the two
-Y0 and Y1 where it enters and leaves the rectangle of the shadow map. With s_O the height of the camera in the map, the
+For a light at infinity a slice holds parallel rays at distances Y from the axis e1 through the camera, between Y0 and
+Y1, where the slice enters and leaves the rectangle of the shadow map. With s_O the height of the camera in the map, the
 point (X, Y) has s = s_O - X. Here k(q) = (s_O, Y) with Y linear in q, and everything below is the same.
 
 The map of a slice holds S = D s of the surfaces at equal steps in q, read from the height field of the shadow map. A
-leaf lies between two of them, and a node of 2^l leaves holds the least and the greatest S over it. Published is one
-depth for a leaf (Chen et al. 2011, Yusov 2013); here it is linear between its ends, like the height field of the light
-volume, and a shadow ends where that says and not at the end of a texel.
+leaf lies between two samples, and a node of 2^l leaves holds the least and the greatest S over it. The publications
+have one depth for a leaf (Chen et al. 2011, Yusov 2013); here S is linear between the ends of a leaf, like the height
+field of the light volume, and a shadow ends where the linear S says, not at the end of a texel.
 """
 
 from dataclasses import dataclass, replace
@@ -115,7 +115,7 @@ def _tree(heights: SliceHeights, at_begin, at_end):
 def _height(shadow_map: ShadowMap, heights, direction):
     """Return s of the surface in a direction k: it is hit at k / s [1/m times |k|].
 
-    Of a light at infinity k is a point less the light's position [m], and s the height of the surface before it [m].
+    For a light at infinity k is a point less the light's position [m], and s the height of the surface on its ray [m].
     """
     size, projection = shadow_map.size, shadow_map.projection
     if projection.basis:

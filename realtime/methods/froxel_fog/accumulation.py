@@ -11,11 +11,11 @@ which goes to S exp(-tau_k) D with sigma. Front to back, with T_k = exp(-tau_k):
 
     L_{k+1} = L_k + T_k S_k D_k (1 - exp(-z))/z,    T_{k+1} = T_k exp(-z),    z = sigma_k D_k;    L_0 = 0, T_0 = 1.
 
-So the slices of a constant medium in constant light add up to S (1 - exp(-sigma x)) / sigma, whatever their number and
-their depths: what a slice absorbs of its own light is not a matter of its size. To multiply S D by T_k instead is wrong
-by z/2, and by T_{k+1} the other way (Hillaire 2015). Where z is small, 1 - exp(-z) cancels, and its series takes over.
+The slices of a constant medium in constant light therefore add up to S (1 - exp(-sigma x)) / sigma for any number and
+depths of slices. Multiplying S D by T_k instead is too bright by a factor of 1 + z/2, and by T_{k+1} too dark by as
+much (Hillaire 2015). Where z is small, 1 - exp(-z) cancels, and its series takes over.
 
-Between the ends of slices, and between columns, a pixel takes what is linear in (u, v, s).
+Between the ends of slices, and between columns, a pixel interpolates linearly in (u, v, s).
 
 References
 ----------

@@ -11,7 +11,7 @@ z the distance along the axis. Slices are equal steps of s. Their distribution i
     z(s) = near ((1 + far/near)^s - 1),        s(z) = log(1 + z/near) / log(1 + far/near),        near = far/8,
 
 which begins at the camera: up to the depth `near` slices are about equally thick, beyond it in proportion to their
-depth. What lies beyond `far` scatters nothing.
+depth. Media beyond `far` scatter nothing.
 """
 
 import math
@@ -125,7 +125,7 @@ def trilinear(volume: Any, size: tuple[int, int, int], place: tuple[Any, Any, An
     corners, weights = [], []
     for steps, last in zip(place, (count - 1 for count in size), strict=True):
         inside = dr.minimum(dr.maximum(steps, 0), last)
-        # What is no number becomes no index either: whole numbers have the upper bound.
+        # A NaN must not become an index out of bounds: whole numbers are bounded again.
         low = dr.minimum(mi.UInt32(inside), last)
         corners.append((low, dr.minimum(low + 1, last)))
         weights.append(inside - Float(low))

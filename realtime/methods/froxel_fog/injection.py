@@ -12,7 +12,7 @@ About a light 1/r^2 has no bound, though its mean over a froxel has. With a half
 
     3/(4 pi a^3) int_0^a (1/r^2) 4 pi r^2 dr = 3/a^2.
 
-So b^2 = a^2/3: a froxel with the light in it has about its mean, those away from the light are as they are, and b
+Hence b^2 = a^2/3: a froxel that holds the light has about the mean, froxels away from the light hardly change, and b
 vanishes with the size of the froxels.
 
 With `jitter=frames` frame n samples at the middle of a froxel plus a place from -1/2 to 1/2 on each of three sides, n

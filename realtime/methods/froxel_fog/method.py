@@ -32,7 +32,7 @@ _NUMBERS = 12  # of a froxel: scattered light and airlight, four each, and as mu
 
 @dataclass(frozen=True)
 class FroxelShadows:
-    """What the froxels of a frame need of its lights."""
+    """The visibility of the lights of a frame."""
 
     maps: tuple[ShadowMap, ...]  #: of the lights without extent; () where rays are cast
     tables: tuple[LightSampleTable, ...]  #: of the others

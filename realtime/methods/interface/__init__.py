@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a method is, what it is given, and what it returns: all that methods and frames know of one another.
+"""The interface between methods and frames: a method, the view that it is given, and the layers that it returns.
 
 Read in this order:
 
 - `method.py`: the view that a method is given, a method with its parameters, and the layers that it returns.
-- `marching.py`: the same integral by midpoint steps: what marchers sum up.
+- `marching.py`: the same integral by midpoint steps, for methods that march.
 """

@@ -107,16 +107,16 @@ def marched_integral(
     airlight, distance
         The rays and the light, and where the rays end [m].
     steps
-        Of every ray.
+        The number of steps on every ray.
     spacing
         'equiangular' in the angle at the light, or 'uniform' in the distance; for a light at infinity both are uniform.
     lit
         Says whether the light reaches points [m].
     running
-        Whether the camera's optical depth is a sum over the steps, each of the density in its middle, as engines have
-        it, and not the medium's own. Where densities vary it is wrong by a term in the square of the step.
+        Whether the camera's optical depth is the midpoint sum over the steps, as in engines, instead of the medium's
+        exact depth. Where densities vary, the sum is wrong by a term in the square of the step.
     shift
-        Where in a step it is asked, from 0 to 1: with an even random number the mean is the integral.
+        The place of the sample in a step, from 0 to 1: with a uniform random number the mean is the integral.
 
     Returns
     -------

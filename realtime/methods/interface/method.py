@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A method: its parameters, what it makes of a scene, and the airlight of a light.
 
-A method is a frozen dataclass derived from `Method`; its fields are its parameters. It answers two questions, each for
-one light: `prepare`, what has to be made of the scene once, such as a shadow map, and `airlight`, which radiance the
-lit media scatter into each camera ray. What a frame must know beyond that are class attributes or properties with
-defaults, so that a method names only what it has. A user's plain function becomes such a class too
+A method is a frozen dataclass derived from `Method`; its fields are its parameters. It has two functions, each for one
+light: `prepare` makes the state that a scene needs once, such as a shadow map, and `airlight` returns the radiance that
+the lit media scatter into each camera ray. Everything else that a frame must know is a class attribute or property with
+a default, so a method states only what differs. A user's plain function becomes such a class too
 (`realtime.methods.user_method`).
 
 A frame shows
@@ -102,7 +102,7 @@ class View(Rays):
 
     @property
     def random(self) -> Noise:
-        """What draws random numbers for this frame of this run."""
+        """The random numbers of this frame of this run."""
         if self.noise is None:
             raise InputError("noise: the method draws random numbers and does not say so; wanted `noisy` = True")
         return self.noise
@@ -165,7 +165,7 @@ ErrorCause = tuple[str, Mapping[str, Any] | None]
 
 @dataclass(frozen=True)
 class Layers:
-    """What a method says of every ray. What it leaves out costs nothing."""
+    """The results of a method for every ray. Layers that it leaves out cost nothing."""
 
     in_scattered: PerRay  #: radiance that the media scatter into the ray, a colour [W/(m^2 sr)]
     #: By light, or by source (`Method.by_source`), which fraction of it reaches the surface: 0 to 1, or a mask; None:
@@ -195,7 +195,7 @@ class Method(Parameters):
     layers: ClassVar[tuple[str, ...]] = ()  #: the names that `Layers.extra` may have
     light_samples: ClassVar[LightSamples] = LightSamples()  #: how it renders area lights by default
 
-    # What a frame must know. Each may be a property that follows from the parameters.
+    # Facts for the frame. Each may be a property that follows from the parameters.
     prepared_from: ClassVar[frozenset[str]] = frozenset(MOVABLE)  #: what `prepare` looks at; else its state is kept
     provides_visibility: ClassVar[bool] = False  #: whether it says which surfaces its lights reach
     by_rays: ClassVar[bool] = False  #: whether each ray is computed by itself, so that any pixels can be rendered alone

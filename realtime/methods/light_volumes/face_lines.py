@@ -10,8 +10,8 @@ and y = x / c. All four are linear along the projective line: with t from 0 to 1
 (1 - t) its value at one and t its value at the other, and x = y / s. At the end of an unbounded ray s = 0 and y = 1 /
 dc.
 
-Of a directional light's face u, v and s are linear in x itself, so y = x with weight 1 in place of s; the
-ray is cut where s = 0, and all before the largest height is lit.
+On the face of a directional light u, v and s are linear in x itself, so y = x with weight 1 in place of s; the ray is
+cut where s = 0, and all before the largest height is lit.
 
 The part of the ray in the face is cut out by c + a >= 0, c - a >= 0, c + b >= 0, c - b >= 0. A ray that stays on the
 border of two faces is in one of them, that of the first axis: neighbours compute the same numbers there, with opposite
@@ -182,8 +182,8 @@ def line_of(heights: InverseDepthField, face, ray: FaceRay) -> Line:
 def _height_in(heights, texel, four, x, y):
     """Return the height at a point of a texel with four heights, and how far below it a lit surface may seem to be.
 
-    That is the range of the heights, as the surface may do anything between the samples. Beside a wall it is half of
-    it: then it is a question of which of two surfaces the point lies on.
+    That distance is the range of the heights, as the surface may do anything between the samples. Next to a wall it is
+    half the range: there the only question is on which of two surfaces the point lies.
     """
     s00, s10, s01, s11 = four
     below = x >= y

@@ -8,8 +8,8 @@ and stands somewhere between the two samples. The same error stands along the wh
 
 Here the place is found. On every side of a texel whose two heights differ by more than `_JUMP` of the larger one, rays
 from the light halve the interval between the samples `_HALVINGS` times, each time keeping the half with the larger
-change of height. What is left of a slope is a small part of its change, and the side stays as it is; of a jump there is
-all of it: a wall stands in the middle of the last interval. That is the idea of silhouette maps (Sen, Cammarano,
+change of height. The last interval holds a small part of the change of a slope, and the side stays as it is; it holds
+the whole change of a jump, and a wall is put in its middle. That is the idea of silhouette maps (Sen, Cammarano,
 Hanrahan 2003), for volumes; the map itself stays as it was.
 """
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Light volumes: volumetric shadows from a shadow map, without marching (Billeter, Sintorn, Assarsson 2010).
 
-What a light reaches directly is the volume between it and the surface that its shadow map samples. A camera ray enters
-and leaves that volume at crossings with its boundary; with Gamma(x) the airlight from the camera to x (the paper's eq.
-1), the airlight of the ray is the signed sum of eq. 3,
+A light reaches directly the volume between itself and the surface that its shadow map samples. A camera ray enters and
+leaves this volume at crossings with its boundary; with Gamma(x) the airlight from the camera to x (the paper's eq. 1),
+the airlight of the ray is the signed sum of eq. 3,
 
     L = sum_n s_n Gamma(min(x_n, x_visible)),   s_n = +1 where it leaves the light, -1 where it enters it,
 

@@ -79,11 +79,11 @@ def passage(heights, face, line: Line, texel) -> Passage:
 
 
 def texel_crossings(line: Line, over: Passage) -> TexelCrossings:
-    """Return where a ray crosses the height field in a texel: over its two triangles, or its two parts beside a wall.
+    """Return where a ray crosses the height field in a texel: over its two triangles, or its two parts at a wall.
 
-    Beside a wall a ray crosses once where it is lit at one end and not at the other, at the first change: from the
-    border to the part, over it, at the wall, over the other part, or from that to the border. If it ends there, the
-    sign of D at its end may be that of rounding, as a surface is the height field: the first two changes count.
+    In a texel with a wall, a ray that is lit at one end only crosses once, at the first change: from the border to the
+    part, over it, at the wall, over the other part, or from there to the border. If the ray ends in the texel, rounding
+    may decide the sign of D at its end, as the surface is the height field: the first two changes count.
     """
     (begin, end), (from_light, to_light) = over.t, over.lit
     middle, before = _on_diagonal(line, over)

@@ -2,10 +2,10 @@
 """The height field over a texel on whose sides upright walls stand: see `realtime.methods.light_volumes.jump_search`.
 
 A texel's walls are one whole number: a byte for each side, 0 or 1 + the number of the place where the wall stands. Both
-texels of a side hold the same byte. On a side with a wall the height is that of the one corner up to the wall and that
-of the other beyond it; on a side without, it is linear. A side looks the same from both of its texels, so all that
-holds of crossings in `realtime.methods.light_volumes.walk` holds still: between two ends of a ray the number of
-changes of sign says whether both are lit.
+texels of a side hold the same byte. On a side with a wall the height jumps at the wall from the height of one corner to
+the height of the other; on a side without, it is linear. A side looks the same from both of its texels, so the rule for
+crossings in `realtime.methods.light_volumes.walk` still holds: the number of changes of sign between two ends of a ray
+says whether both are lit.
 
 One straight line divides the texel into two parts, each under a plane; where these differ a wall stands on the line:
 
@@ -16,9 +16,9 @@ One straight line divides the texel into two parts, each under a plane; where th
 * else the line is the diagonal from (0, 0) to (1, 1), between two triangles, as without walls.
 
 A plane through three corners may leave their range towards the fourth: `walled_heights` widens the bounds that rays go
-by. Beside a corner that is cut off the border and the plane differ by the slope over a part of a texel, and of walls on
-three or four sides one or two end at the border: there a step stands on the border itself, and which side of it is lit
-says the border.
+by. Next to a corner that is cut off, the border and the plane differ by the slope over a part of a texel. If three or
+four sides have walls, one or two walls end at the border: there a step stands on the border itself, and the border says
+which side of it is lit.
 """
 
 from dataclasses import dataclass, replace

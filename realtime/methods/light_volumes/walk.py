@@ -7,14 +7,14 @@ over which the ray is above the largest height is lit as a whole, one over which
 steps to its neighbour, one level up where the border is that of the parent too. Into any other node it descends, down
 to the texels. In a texel it crosses the height field not at all, once, or twice
 (`realtime.methods.light_volumes.texel_crossings`), and between crossings it is lit or dark as a whole
-(`realtime.intervals`). So crossings come in the order of the ray.
+(`realtime.intervals`). Crossings therefore come in the order of the ray.
 
-The borders of a node are crossed at t = (column - u0) dt/du and t = (row - v0) dt/dv, computed from its own four
-borders alone. So two neighbours see the same number t between them and, if they are texels, the same two heights: D,
-lit or not, is the same for both. A whole node says by itself whether it is lit; where that is not what the ray was
-before it, by rounding, the change is at its beginning.
+The borders of a node are crossed at t = (column - u0) dt/du and t = (row - v0) dt/dv, computed from these four borders
+alone. Two neighbours therefore see the same number t between them and, if they are texels, the same two heights: the
+sign of D, lit or not, is the same for both. A whole node says by itself whether it is lit; where rounding makes this
+differ from the ray before the node, the change is at the beginning of the node.
 
-What is lit up to the border of a face, and on from there in the next one, is one interval.
+Lit intervals that meet at the border of two faces are one interval.
 """
 
 from collections.abc import Callable
@@ -196,7 +196,7 @@ def _next_texel(way: _Way, walk: _Walk) -> _Walk:
 def _changed(intervals: LitIntervals, x, opened, lit, changes):
     """Return the intervals, and where the last one opened, behind a place `x` [m] where the light comes or ends.
 
-    Of two places one closes an interval and the other opens one; nothing may wait.
+    If there are two places, one closes an interval and the other opens one; nothing may wait.
     """
     (first, second), (changes, twice) = x, changes
     closes = (changes & lit) | twice

@@ -116,7 +116,7 @@ class Host:
         for number, (stage, (program, triangle)) in enumerate(zip(self.stages, self.programs, strict=True)):
             textures = dict(self.textures)
             for other, made in enumerate(self.stages[:-1]):
-                # What is not drawn yet in this frame is that of the last one.
+                # A stage that is not drawn yet in this frame shows the last frame.
                 textures[f"{made['name']}_image"] = self.targets[other][now if other < number else last][0]
                 textures[f"{made['name']}_last"] = self.targets[other][last][0]
             unit = 0

@@ -3,11 +3,11 @@
 
 Row 0 of OpenGL is the lowest: pixels are counted from the lower left here, and images turned round at the border.
 
-A phase function is given in 1/sr with the integral 1, as engines count it; kernels here have the mean 1. Written so
-that nothing cancels in a sharp lobe: 1 + g^2 - 2 g c = (1 - |g|)^2 + 2 |g| (1 - sign(g) c).
+A phase function is given in 1/sr with the integral 1, as engines count it; kernels here have the mean 1. The formula 1
++ g^2 - 2 g c = (1 - |g|)^2 + 2 |g| (1 - sign(g) c) avoids cancellation in a sharp lobe.
 
-The intensity of a soft spot is linear in the angle from the axis between beam and cut-off, as in Mitsuba. Of that angle
-the distance to the cut-off is computed, by one arc tangent: the difference of two would cancel at the dim edge.
+The intensity of a soft spot is linear in the angle from the axis between beam and cut-off, as in Mitsuba. One arc
+tangent computes the distance of this angle to the cut-off: a difference of two would cancel at the dim edge.
 """
 
 from collections.abc import Mapping

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a shader is given of a view: arrays in the order of OpenGL's images, their first row the lowest.
+"""The arrays of a view that a shader is given, in the order of OpenGL's images: the first row is the lowest.
 
 A ray that meets nothing ends all the same: at the foot of the farthest light and 20/sigma_t behind it, where e^-20 =
 2e-9 of its light is left. Its distance is negative in the array, and `Ray.hit` false.

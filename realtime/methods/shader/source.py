@@ -128,7 +128,7 @@ def read_shader(path: Path) -> ShaderSource:
 
 
 class _Reader:
-    """What is found in the files of a shader."""
+    """Collects the declarations in the files of a shader."""
 
     def __init__(self, what: str) -> None:
         self.what = what

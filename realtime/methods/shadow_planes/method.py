@@ -140,7 +140,7 @@ class ShadowPlanes(Method):
 
     @property
     def at_once(self):
-        """What is no light's own, and a buffer that rounds, hold for the sum of all lights."""
+        """Ambient light and a buffer that rounds apply to the sum of all lights."""
         return self.buffer == "8bit" or self.ambient > 0
 
     @property
@@ -268,7 +268,7 @@ class PlanePreparation:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What planes in the order of a paper do not count right; in the exact order all is right."""
+        """Occluders that the planes count wrong in a paper's order; the exact order counts all right."""
         return () if self.order == "exact" else tuple(self.occluders.warnings)
 
     def start(self, scene: Scene) -> Callable[[], tuple[PlaneIndex, ...]]:

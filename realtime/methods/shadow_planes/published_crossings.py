@@ -9,12 +9,13 @@ subtracts. Without an order every plane counts.
 
 **Bounded media** (5.2). A ray is drawn in each medium by itself: its end is the exit from the medium or the surface
 before that, whose Gamma is added if it is lit, and the entry, a back facing triangle of the bounds in the paper, is
-drawn in the order of the planes. It subtracts its Gamma if the stencil is zero, and sets the stencil to 255: of what is
-closer to the camera nothing passes. So for order=paper an entry counts by the cosine of the angle at the light between
-the camera and itself, planes of a larger cosine are left out, and it comes last. The paper asks for small triangles,
-since their middles stand for them in the order: here they are points. Otherwise the planes behind the entry count.
+drawn in the order of the planes. It subtracts its Gamma if the stencil is zero, and sets the stencil to 255: planes
+closer to the camera do not pass. For order=paper an entry therefore counts by the cosine of the angle at the light
+between the camera and itself, planes of a larger cosine are left out, and it comes last. The paper asks for small
+triangles, since their middles stand for them in the order: here they are points. Otherwise the planes behind the entry
+count.
 
-**The frame buffer** holds the frame, not one sum: what is there already is `start`.
+**The frame buffer** holds the frame, not one sum: `start` is its content before.
 """
 
 from dataclasses import dataclass
@@ -48,7 +49,7 @@ class Entry:
 
 @dataclass
 class _Draw:
-    """What has been drawn of a ray's planes."""
+    """Progress in drawing the planes of a ray."""
 
     place: Any  #: next entry to read
     stencil: Any

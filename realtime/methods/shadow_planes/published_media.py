@@ -22,7 +22,7 @@ small, Gamma is that of the point itself.
 The exact form, ``media=exact``, has no Gamma beyond the medium: there it begins at A and keeps its value from F on,
 with kinks at the bounds that no vertex knows of. Nodes that stand in for a polynomial begin at A, too.
 
-What absorbs before the medium on the way to the camera is a factor of the ray; the paper does not mention it.
+The transmittance between the medium and the camera is a factor of the ray; the paper does not mention it.
 """
 
 from collections.abc import Sequence

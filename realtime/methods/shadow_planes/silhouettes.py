@@ -9,8 +9,9 @@ is crossed with the coefficient
     c_e = sum_t s_te w_t,    s_te = +1 if t runs along e from a to b, -1 if it runs from b to a.
 
 The edges with c_e != 0 are the silhouette. As a sum of borders it is a cycle: at each vertex as many layers begin as
-end, *whatever signs w_t have*. So a triangle whose plane holds the light, and whose sign is a matter of rounding,
-changes the count only inside its own projection, which has no area; and the count over a direction is a whole number.
+end, *whatever signs w_t have*. A triangle whose plane holds the light, and whose sign is therefore a matter of
+rounding, changes the count only inside its own projection, which has no area; and the count over a direction is a whole
+number.
 
 Layers:
 
@@ -21,20 +22,20 @@ Layers:
 * a triangle whose plane holds the light counts nothing, w = 0.
 
 With the light at (l, 1), or (l, 0) where it is at infinity (`realtime.scene.lights`), the front of a triangle with the
-normal n in the plane n . p = c faces it where n . l - c > 0, or n . l > 0. Nothing else here knows where the light is:
-of one at infinity the plane across it takes the place of the sphere of directions.
+normal n in the plane n . p = c faces it where n . l - c > 0, or n . l > 0. Nothing else here depends on the position of
+the light: at infinity, the plane across its direction replaces the sphere of directions.
 
 Biri, Arques, Michelin 2006, section 5.1.1, for closed meshes.
 
-**A spot as an occluder**: the cone over a point light that the paper adds (its section 6, with 32 edges). What is
-outside the cone is in shadow, one layer deep. Its silhouette is a ring of edges about the axis, close to the light; the
-corners lie on the cone of the spot, so that the pyramid is inside it. As the light sees the ring it runs
+**A spot as an occluder**: the cone over a point light that the paper adds (its section 6, with 32 edges). Points
+outside the cone are in shadow, one layer deep. Its silhouette is a ring of edges about the axis, close to the light;
+the corners lie on the cone of the spot, so that the pyramid is inside it. As the light sees the ring it runs
 counter-clockwise, with no layer to its left and one to its right: every edge has the coefficient -1.
 
-**What the camera can see.** The shadow volume of an occluder lies in its bounding box extruded away from the light at
-(l, w): all points c + s (w c - l), s >= 0, c in the box. That is convex, the hull of the corners c and of the
-directions w c - l. It misses the view if it lies wholly outside one of the five planes through the pinhole that bound
-what the camera sees (section 5.2 of the paper does the same for bounded media).
+**Culling.** The shadow volume of an occluder lies in its bounding box extruded away from the light at (l, w): all
+points c + s (w c - l), s >= 0, c in the box. That is convex, the hull of the corners c and of the directions w c - l.
+It misses the view if it lies wholly outside one of the five planes through the pinhole that bound what the camera sees
+(section 5.2 of the paper does the same for bounded media).
 """
 
 from dataclasses import dataclass

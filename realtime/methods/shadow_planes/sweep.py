@@ -14,8 +14,8 @@ eight; after that it collects the eight nearest crossings from the whole list, g
 and so on. That is right for any order.
 
 A walk is one loop that reads a plane or goes over a crossing. An interval that has ended waits until every fourth plane
-(`realtime.intervals` says why): neighbours whose intervals end at two edges of one silhouette are then
-served at once. What is lit to the end of the ray is added behind the loop, which rays that cross nothing do not enter.
+(`realtime.intervals` says why): neighbours whose intervals end at two edges of one silhouette are then served at once.
+An interval that is lit to the end of the ray is added after the loop, which rays without crossings do not enter.
 """
 
 from collections.abc import Callable
@@ -130,7 +130,7 @@ def sum_lit_intervals(index: PlaneIndex, ray: RayPlanes, segment, integral, zero
 
 @dataclass(frozen=True)
 class _Sweep:
-    """What stays the same during a walk."""
+    """The constants of a walk."""
 
     index: PlaneIndex
     ray: RayPlanes
@@ -141,7 +141,7 @@ class _Sweep:
 
 @dataclass
 class _Passed:
-    """What a ray has passed; places are quotients D/x."""
+    """The state of a ray after the planes that it has passed; places are quotients D/x."""
 
     layers: Any  #: over the point
     quotient: Any  #: of the last crossing
@@ -221,7 +221,7 @@ def _walk(sweep: _Sweep, active, *, places: int):
 def _collect(sweep: _Sweep):
     """Collect the nearest crossings beyond the last one from the whole list and go over them, until there are none.
 
-    Of crossings at one quotient, which come in the order of the list, as many as were gone over are left out.
+    Crossings at one quotient come in the order of the list; as many as were already gone over are left out.
 
     Returns what the ray has passed.
     """

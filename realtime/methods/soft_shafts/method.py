@@ -228,10 +228,10 @@ class _Frame:
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
 
     def _where_narrow(self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, points: int) -> Any:
-        """Return the fraction with that of a few points where penumbrae are narrow: neighbours then ask the others.
+        """Return the fraction, with the rest of each pixel's group of light samples where penumbrae are narrow.
 
-        Pixels side by side lie in other groups of `_GROUP` points, four of which the filter that follows brings
-        together. Of its own group a pixel has asked one point before.
+        Adjacent pixels lie in different groups of `_GROUP` light samples; the filter that follows combines four groups.
+        A pixel has already tested one sample of its group.
         """
         p = self.parameters
         group = min(_GROUP, points)

@@ -41,14 +41,14 @@ _NEARER = 0.01  # what is this much nearer to the light than a surface, of its o
 
 @dataclass(frozen=True)
 class Reached:
-    """What of a light reaches the visible surfaces, row by row."""
+    """The light samples that reach the visible surfaces, row by row."""
 
     lit: Any  #: sum of the weights of the light samples that reach them
     all: Any  #: sum of all weights
 
     @property
     def fraction(self) -> Any:
-        """From 0 to 1; 1 where no point could reach the surface."""
+        """From 0 to 1; 1 where no sample could reach the surface."""
         return dr.select(self.all > 0, self.lit / self.all, 1)
 
 

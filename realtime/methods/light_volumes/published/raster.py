@@ -17,10 +17,10 @@ pixels in that row: those with left <= column < right. Where one of the ends is 
 the image to the side on which it passes z = 0, and the span is a half line.
 
 Why it is watertight: fma(-j, z, b) has the sign of b - j z itself, and B and A are ordered by that sign, not by
-triangle. So the two triangles of an edge find the same bits for its column. In one row the segments of a closed mesh
-join into closed polygons, directed from the edge that goes up the image to the one that goes down. Every pixel that
-such a polygon passes to the right it passes to the left as well: the signs of the crossings before a camera outside the
-volume add up to exactly 0, before one inside it to exactly 1.
+triangle. The two triangles of an edge therefore find the same bits for its column. In one row the segments of a closed
+mesh join into closed polygons, directed from the edge that goes up the image to the one that goes down. Every pixel
+that such a polygon passes to the right it passes to the left as well: the signs of the crossings before a camera
+outside the volume add up to exactly 0, before one inside it to exactly 1.
 
 Over a triangle w/z, the inverse depth, is linear in the image, and so it is along a span: it is found at the span's
 first and last pixel, as a combination of both ends with weights of 0 or more, and interpolated between the two. No

@@ -110,8 +110,8 @@ def _across(flags):
     lower[:, 1:], upper[:, :-1] = flags[:, :-1], flags[:, 1:]
     left[:, :, 1:], right[:, :, :-1] = flags[:, :, :-1], flags[:, :, 1:]
     if len(flags) == 6:
-        # Axis k has across and up along the axes k + 1 and k + 2, counted cyclically. So the side u = +-1 of face (k,
-        # sign) is the side v = sign of face (k + 1, +-1), and its side v = +-1 is the side u = sign of face (k + 2,
+        # Axis k has across and up along the axes k + 1 and k + 2, counted cyclically. Hence the side u = +-1 of face
+        # (k, sign) is the side v = sign of face (k + 1, +-1), and its side v = +-1 is the side u = sign of face (k + 2,
         # +-1); what runs along the side is the same coordinate on both.
         for face in range(6):
             axis, border = face >> 1, -1 if face & 1 == 0 else 0
