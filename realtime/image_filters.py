@@ -32,8 +32,8 @@ with quantised images, where it is an approximation.)
 
 **The mean over a tile of 4 x 4 pixels**, each of which has another of sixteen samples.
 
-A window of 4 x 4 that is moved to every pixel holds each sample once, but it lies half a pixel to one side. So the
-window has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns: the two taps at its ends have the same
+A window of 4 x 4 that is moved to every pixel holds each sample once, but it lies half a pixel to one side. The window
+therefore has 5 x 5 taps with weights 1/2, 1, 1, 1, 1/2 along rows and columns: the two taps at its ends have the same
 sample, and each sample has the weight 1. Where a guide leaves out some taps, those that are left are normalised.
 
 **Joint bilateral up-sampling:** an image of every `scale`-th pixel becomes one of all, with a depth test.
@@ -174,7 +174,7 @@ class Taps:
             difference = dr.gather(Float, channel, place) - middle
             exponent = dr.fma(-falloff(width) * difference, difference, exponent)
         if self.wide.inside is not None:
-            # Of a number the weight is a number: then a tap costs no exponential.
+            # If the exponent is a Python number, so is the weight: then a tap costs no exponential.
             fraction = dr.gather(Float, self.wide.inside, place) * weight(exponent)
         else:
             fraction = weight(exponent)

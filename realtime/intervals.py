@@ -8,27 +8,27 @@ changes (two shadows overlap). With :math:`[a_i, b_i]` the intervals between, th
 
 of positive terms, one for each interval, where a sum of :math:`\pm F(x_n)` over the boundaries loses digits.
 
-Of each ray the last interval is kept, from `begin` to `end`, and whether it `waits` to be added to the sum:
+Each ray holds its last interval, from `begin` to `end`, and whether it `waits` to be added to the sum:
 
 - the light comes back: the interval opens here (`open_interval`), and nothing may wait;
 - the light ends: the interval closes here and waits (`close_interval`), and no other may have waited;
-- the ray ends: what waits is added, and what is lit up to there (`sum_at_end`).
+- the ray ends: the waiting interval is added, and the one that is lit up to there (`sum_at_end`).
 
-A walk that lets an interval wait until another one closes keeps itself where that one opened.
+A walk that lets an interval wait until the next one closes has to remember where the next one opened.
 
-That an ended interval waits is what makes walks fast. Sixteen rays and more go in step, and what one of them does all
-of them wait for; an integral costs as much as many steps. So each method chooses when to call `add_waiting`, and rays
-whose intervals end a few steps apart are served at once: `realtime.methods.shadow_planes.sweep` does it at every fourth
-plane, `realtime.methods.epipolar.walk` when every ray has an interval or is at its end, and
-`realtime.methods.light_volumes.walk` when an interval does not go on in the next face of the map.
+Waiting makes walks fast. Sixteen rays or more go in step, and all wait for each of them; an integral costs as much as
+many steps. Each method therefore chooses when to call `add_waiting`, and rays whose intervals end a few steps apart are
+served at once: `realtime.methods.shadow_planes.sweep` does it at every fourth plane, `realtime.methods.epipolar.walk`
+when every ray has an interval or is at its end, and `realtime.methods.light_volumes.walk` when an interval does not go
+on in the next face of the map.
 
 Places are whatever rises or falls along a ray, distances or quotients D/x; `integral` takes them as they are.
 
 **A queue of the nearest crossings** puts boundaries in order where a walk meets them out of order, in registers, with
 the nearest first. A crossing has a key, which says how near it is, and may have a gain, which says what changes there.
-Every place of the queue is compared at every insertion, without branches: two to five instructions a place. What has no
-place comes out, so a caller knows that it must go over its crossings again for those that are farther. Crossings of one
-key stay in the order in which they came.
+Every place of the queue is compared at every insertion, without branches: two to five instructions a place. A crossing
+that finds no place is returned, so a caller knows that it must go over its crossings again for the farther ones.
+Crossings of one key stay in the order in which they came.
 """
 
 from collections.abc import Callable

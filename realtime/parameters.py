@@ -48,7 +48,7 @@ class Parameters:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the metadata of a field say about a parameter, beside its default."""
+    """The metadata of a parameter's field: its help and the values that it may have."""
 
     help: str
     choices: tuple[Any, ...] = ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The geometry of a ray and a light: the foot of the perpendicular, the height, what of the ray is lit, and how much.
+"""The geometry of a ray and a light: the foot of the perpendicular, the height, the lit part of the ray, and how much.
 
 With v = l - w origin, the homogeneous vector from the camera to the light (`realtime.scene.lights`), and a unit
 direction d, ``foot = v . d`` and ``height = |v x d|``. For a light at infinity, w = 0, v has unit length, and they are
@@ -22,7 +22,6 @@ Where that is 0 the ray meets the plane. The vector in brackets has the length o
 right to rounding as close to the light as v x d is.
 
 **Where a ray enters and leaves a cone about a spot's axis.**
-
 
 With v = light - origin, a unit direction d and a unit axis a, let w = v x d, whose length is the height h of the ray,
 and let w x d = d (v . d) - v be the vector from the light to the foot point. The point at the distance s from the foot
@@ -48,7 +47,7 @@ common factor of d is one of h and across both.
     enter = (-B + cos sqrt(D)) / A,     leave = (-B - cos sqrt(D)) / A.
 
 Where A is close to 0 one of them cancels, which then is C/q, q = -B - sign(B) cos sqrt(D) the numerator of the other.
-But C cancels too, by up to axial^2 where the ray is tangent. So the first form serves for A < -cos^2/2, that is
+But C cancels too, by up to axial^2 where the ray is tangent. The first form therefore serves for A < -cos^2/2, that is
 axial^2 < cos^2/2, and C/q elsewhere: neither loses more than 2/cos^2. A itself cancels for rays along lines on the
 cone. From h^2 A = D - offset^2 it has all digits where the ray is tangent, and keeps those that axial^2 - cos^2 loses
 of rays along a narrow beam, where axial and cos are both close to 1.

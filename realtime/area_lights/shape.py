@@ -47,12 +47,12 @@ class AreaLight:
 
     @property
     def radius(self) -> float:
-        """Of a disk or sphere [m]."""
+        """Radius of a disk or sphere [m]."""
         return float(np.linalg.norm(self.across))
 
     @property
     def area(self) -> float:
-        """What shines [m^2]."""
+        """Emitting area [m^2]."""
         if self.kind == "mesh":
             return float(0.5 * np.linalg.norm(self.normals, axis=1).sum())
         across, up = float(np.linalg.norm(self.across)), float(np.linalg.norm(self.up))

@@ -19,43 +19,43 @@ where its light enters the slab: c = f + (c_x x + c_y y)/sigma_t.
 
 Where a cloud is no slab:
 
-* p above the filtered face: d = 0. A cloud has bumps that the filter has not.
+* p above the filtered face: d = 0. The filter removes bumps of the cloud.
 * p deeper than the slab is thick: t = d. There is cloud down to p at least.
 * The sun below the tangent plane, or in it: mu_L is `LEAST_COSINE` at least, and n is turned towards the sun until it
   is. Normals of a map face the light, so means of them are never below the plane; at silhouettes they come close to it.
 * Opposed normals whose mean is 0 (both sides of a ridge): n is the direction towards the sun.
-* The sun in the zenith: x is any horizontal direction; the transport depends on none.
+* The sun in the zenith: x is any horizontal direction, as the transport does not depend on it.
 
-`thickness=light` has both lengths along the light, as printed: t = sigma_t Z and d/mu_L, what a depth map holds.
-A slab in which the sun stands at 75 degrees is then 3.9 times too thick.
+`thickness=light` measures both lengths along the light, as printed: t = sigma_t Z and d/mu_L, the lengths in a depth
+map. A slab in which the sun stands at 75 degrees is then 3.9 times too thick.
 
 **The collector of a set of orders:** a fixed point on the lit surface of a cloud (Bouthors 2008, section 6.1).
 
 Let P(c, sigma) be the slab that touches the surface filtered by sigma where c lies along the light, and F the canonical
-transport: it tells of a slab and of p and v in it the place and the width (c, sigma) of the entry of light. Wanted is
+transport, which maps a slab, p and v to the place and the width (c, sigma) where light enters. The search solves
 
     (c, sigma) = F(P(c, sigma)).
 
-Seen along the light, the map from c to c is one of the plane into itself. On a slab it is constant: the first step is
-right and the second finds that it is. On a cloud it turns with the normal of the surface at c, over the distance from c
-to p: where both are large it is no contraction, and steps overshoot.
+Seen along the light, the map from c to c maps the plane into itself. On a slab the map is constant: the first step is
+right and the second confirms it. On a cloud the map varies with the normal of the surface at c, times the distance from
+c to p: where both are large it is no contraction, and steps overshoot.
 
 * *Projection*. c' is the point of the tangent plane that c lies over, along the light: it differs from c where the
   surface curves.
 * *Step*. c' + w (F - c'), no longer than the new sigma (the paper's bound on |c_i - c_(i-1)|): the surface was filtered
   by sigma, and says nothing of what lies further away.
 * *Two-cycles*. Where the map has a slope below -1 along the line between two places, the steps go to and fro between
-  them for ever. w is 1 at first, and half of what it was after every step that turns back (its scalar product with the
-  last one is negative). The mean of the map and the identity with the weight w has the slope 1 - w (1 - s), which is
-  within (-1, 1) for every s from 1 - 2/w on: -3 for w = 1/2, -7 for 1/4.
+  them without end. w is 1 at first, and is halved after every step that turns back (its scalar product with the last
+  step is negative). The mean of the map and the identity with the weight w has the slope 1 - w (1 - s), which is within
+  (-1, 1) for every s from 1 - 2/w on: -3 for w = 1/2, -7 for 1/4.
 * *Start*. c = p, and sigma so large that the whole lit surface is one plane; or the collector of the last frame.
-* *Cover*. Light enters where there is cloud. Of the collector's width the fraction A of the filtered map is cloud, so
-  the light of the slab, whose face has no end, counts A times; the paper counts it whole.
-* *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu| upwards,
-  (t - d)/mu downwards. Light that was scattered into the ray on the way T, not L, is what the eye gets: it counts
-  (1 - exp(-T))/(1 - exp(-L)) times, as if its source were even. Where the ray leaves the slab through the lit face
-  (mu < 0), p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin parts are
-  too bright, and slopes that face away from the sun are black.
+* *Cover*. Light enters where there is cloud. Only the fraction A of the collector, read from the filtered map, is
+  cloud, so the light of the infinite slab is weighted by A; the paper does not weight it.
+* *Way*. The ray behind p has the depth T in clouds, and the slab L along the same direction: d/|mu| upwards, (t - d)/mu
+  downwards. The eye gets the light that was scattered into the ray over the depth T, not L: the light is weighted by (1
+  - exp(-T))/(1 - exp(-L)), as if its source were uniform. Where the ray leaves the slab through the lit face (mu < 0),
+  p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin parts are too bright,
+  and slopes that face away from the sun are black.
 * *End*. After `iterations` steps; or in those rays that take no more than a fraction `settled` of sigma as their step.
   The light is that of the last slab: F gives it with the place and the width.
 
@@ -63,9 +63,9 @@ The distance |F - c'| / sigma of the last step says how far the search is from i
 
 **The light of all sets of orders at points of a cloud under one sun:** one search for each set.
 
-A frame leaves to the next the collectors of each set: the vectors from the points to the centres, and the
-widths, which are 0 where there is none. Where the camera moved, a point of the next frame lies beside the one whose
-collector it takes, and its collector lies beside that too.
+A frame leaves to the next the collectors of each set: the vectors from the points to the centres, and the widths, which
+are 0 where there is none. Where the camera moved, a point of the next frame is displaced from the point whose collector
+it takes, and its collector is displaced, too.
 """
 
 from dataclasses import dataclass, replace
@@ -166,7 +166,7 @@ class Collector:
 
 @dataclass(frozen=True)
 class CollectorLight:
-    """What a search ends with."""
+    """The result of a search."""
 
     collector: Collector
     radiance: Any  #: for unit irradiance across the beam [1/sr]

@@ -34,7 +34,7 @@ SIZE, LAYERS = 256, 64  #: texels on a side, layers of each
 
 @dataclass(frozen=True)
 class LightDepths:
-    """What lies between one sun and the points of one cloud; row by row, the layers of a texel one after the other."""
+    """Depths between one sun and the points of one cloud; row by row, the layers of a texel one after the other."""
 
     lengths: Any  #: l at the K + 1 heights of each texel [m]
     front: Any  #: by texel [m]
@@ -108,7 +108,7 @@ def light_depths(
         # A step ends at a layer's end at the latest, or a rounding of the distance behind it.
         fraction = dr.clip((end - first) / dr.maximum(last - first, 1e-20), 0, 1)
         reached = dr.minimum(mi.UInt32(dr.fma(dr.sqrt(fraction), LAYERS, 1e-3)), LAYERS)
-        # What the next layer has if the ray leaves the cloud before it; a later step writes over it.
+        # The next layer keeps this length if the ray leaves the cloud before it; a later step writes over it.
         dr.scatter(lengths, length, texel * (LAYERS + 1) + dr.minimum(reached + 1, LAYERS), own)
         dr.scatter(lengths, length, texel * (LAYERS + 1) + reached, own & (reached > layer))
         return (dr.maximum(layer, reached), length), end < last

@@ -15,28 +15,28 @@ texels of
 
     A,   A front,   A back,   A (u, v),   A n,
 
-so that what is read of them over what is read of A is the mean over the cloud alone, and what lies beside it counts
-for nothing (Bouthors 2008, section 7; Dachsbacher and Stamminger 2003). The mean of (u, v) is no part of the paper: it
-says *where* the mean of the heights is. Over the middle of a cloud it is the place that was asked for; at a silhouette
-it lies on the side of the cloud, and a tangent plane through the mean height must go through it there.
+so that their values divided by the value of A are means over the cloud alone, and texels outside the cloud count for
+nothing (Bouthors 2008, section 7; Dachsbacher and Stamminger 2003). The mean of (u, v) is not in the paper: it says
+*where* the mean of the heights is. Over the middle of a cloud it is the requested place; at a silhouette it lies on the
+side of the cloud, and a tangent plane through the mean height must go through it there.
 
-*Normals*. The plane that touches a filtered surface has its mean slope. So n is 1 long along the light, (slope, 1), as
-means of these are. Slopes are differences of the heights of neighbouring texels, whose sum over many texels is the
-difference of their ends: what a bump hides counts as the step that it is. A mean of unit normals, as printed, has too
-much of what faces the light, where a map sees most, and nothing of what is hidden. On clouds with bumps it leans
-towards the light, and slabs across it are too thick.
+*Normals*. The plane that touches a filtered surface has the mean slope of the surface. Hence n has the component 1
+along the light, (slope, 1), which means preserve. Slopes are differences of the heights of neighbouring texels, whose
+sum over many texels is the difference of the two ends: a surface that a bump hides counts as a step. A mean of unit
+normals, as printed, has too many normals that face the light, where a map sees most, and none of hidden surfaces. On
+clouds with bumps it leans towards the light, and slabs across it are too thick.
 
-*Width*. A mean over a square of width w has the variance w^2/12 along each axis, and what is linear between such means
-adds the w^2/6 of a tent: w^2/4 together. So the level of a filter of standard deviation sigma is
+*Width*. A mean over a square of width w has the variance w^2/12 along each axis, and linear interpolation between such
+means adds the w^2/6 of a tent: w^2/4 together. The level of a filter of standard deviation sigma is therefore
 
     w = 2 sigma,   l = log2(2 sigma / texel),
 
-and what lies between two levels is linear in l.
+with linear interpolation in l between two levels.
 
-*Holes*. Where all texels that are read have A = 0 there is no mean. So a texel without cloud takes what its parent
-holds, with the weight `HOLE`: a look-up beside the cloud finds what is nearest to it, from the finest level that holds
-anything of the cloud, and a look-up at the cloud is changed by a fraction of `HOLE` at most. Holes are filled when all
-levels are there, from the coarsest down, so that no mean counts them.
+*Holes*. Where all texels that are read have A = 0 there is no mean. A texel without cloud therefore takes the values of
+its parent, with the weight `HOLE`: a look-up outside the cloud finds the nearest values, from the finest level that
+holds any of the cloud, and a look-up in the cloud changes by a fraction of `HOLE` at most. Holes are filled when all
+levels exist, from the coarsest down, so that no mean counts them.
 """
 
 from collections.abc import Sequence
@@ -153,7 +153,7 @@ def slope_normals(surfaces: LitSurfaces, projection: Projection) -> Any:
     size, Float = surfaces.size, type(surfaces.front)
     across, up, axis = projection.basis
     row, column = surfaces.place // size, surfaces.place % size
-    # Neighbours are found row by row. What else is read later is kept now: rays would be cast again for it.
+    # Neighbours are found row by row. All that is read later is evaluated now: otherwise rays would be cast again.
     fronts, there = dr.empty(Float, size * size), dr.empty(type(surfaces.there), size * size)
     dr.scatter(fronts, surfaces.front, surfaces.place)
     dr.scatter(there, surfaces.there, surfaces.place)

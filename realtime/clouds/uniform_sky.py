@@ -13,8 +13,8 @@ is divided among the orders.
 
 For a slab of the thickness t and a ray of the cosine mu these fractions follow from the equation of transfer with light
 entering at both faces, I_0 = exp(-s/|mu|), s the depth from the face where a direction enters, order after order as in
-`realtime.clouds.slab_orders`, in the mean over azimuths alone. What is kept is divided by 1 - exp(-t/mu), so that the
-fractions of all sets add up to 1 at albedo 1.
+`realtime.clouds.slab_orders`, in the mean over azimuths alone. The fractions are divided by 1 - exp(-t/mu), so that
+those of all sets add up to 1 at albedo 1.
 
 **The light that clouds scatter from a uniform sky into rays, by set of orders.**
 

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Airlight between the corners of tiles, where it is nearly linear: a wrapper around whatever renders some pixels.
+r"""Airlight between the corners of tiles, where it is nearly linear: a wrapper around any function that renders some
+pixels.
 
-Most pixels of a frame lie in beams and shadows, few on their edges. So a ray is computed in the first pixel of every
-tile of 4 x 4, and all pixels of a tile only where the airlight between these corners cannot be told from them.
+Most pixels of a frame lie in beams and shadows, few on their edges. A ray is therefore computed in the first pixel of
+every tile of 4 x 4, and all pixels of a tile only where its corners do not determine the airlight between them.
 
 Let Delta be the second difference f_(i-1) - 2 f_i + f_(i+1) of the airlight along a row or a column of corners, h
 apart. Where f is smooth, linear interpolation misses it by up to |f''| h^2/8, which is Delta/8. Where it has a kink
 between two corners, at the fraction w of the way and with a change of slope s, it misses it by s h w (1 - w), while the
-Deltas at the two corners are s h (1 - w) and s h w: the larger is at least twice the error. So a tile is interpolated
-where
+Deltas at the two corners are s h (1 - w) and s h w: the larger is at least twice the error. A tile is therefore
+interpolated where
 
     |Delta| <= tolerance f
 
@@ -23,8 +24,8 @@ tolerance, s h w <= tolerance f + c, at the ends of a row
 
 which is the most by which a kink and a curvature together can err.
 
-What no corner sees is missed: beams and shadows thinner than a tile. Surfaces are not, since the pixels of an
-interpolated tile and its corners have to be about equally far away, and the light reaches the surface at all four
+Beams and shadows thinner than a tile are missed if no corner sees them. Surfaces are not missed, since the pixels of an
+interpolated tile and its corners have to be about equally far away, and the light has to reach the surface at all four
 corners or at none.
 """
 

@@ -37,7 +37,7 @@ _ALIKE = 0.05  # relative difference of depths up to which a pixel shows the sam
 
 @dataclass(frozen=True)
 class PastFrames:
-    """What frames leave to the next one, row by row."""
+    """The averaged image that frames leave to the next one, row by row."""
 
     image: PerRay  #: H, a colour [W/(m^2 sr)]
     distance: Metres  #: to the visible surface [m]
@@ -99,7 +99,7 @@ def _same_surface(past: PastFrames, camera: Camera, pixel: PerRay, distance: Met
     away = dr.select(there, dr.fma(aim, mi.Float64(dr.select(there, distance, 0)), moved), aim)
     i, j, depth = last.project(away)
     x, y = last.grid.half_width - i, last.grid.half_height - j
-    # Beside the image no whole number has room for the place.
+    # A place outside the image may be too large for a whole number.
     known = (depth > 0) & (x > -1) & (x < camera.width) & (y > -1) & (y < camera.height)
     x, y = dr.select(known, x, 0), dr.select(known, y, 0)
     column, row = mi.Int32(dr.floor(x)), mi.Int32(dr.floor(y))

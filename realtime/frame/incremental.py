@@ -31,11 +31,11 @@ from realtime.scene.read_scene import Scene
 
 @dataclass(frozen=True)
 class FrameCache:
-    """What a frame leaves to the next one, by what it depends on."""
+    """The parts of a frame that the next one can use again, each with its dependencies."""
 
     cast: Any  #: a `Cast`, of camera and geometry; None where the first frame is yet to cast it
     state: Any  #: lights and geometry, shadow planes also the camera: `Method.prepared_from`
-    carried: Any = None  #: what the method handed on from the last frame
+    carried: Any = None  #: arrays that the method handed on from the last frame
     extra: Any = None  #: further layers of the last frame by their names; no frame needs them
     frames: int = 1  #: how many frames there were
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""What no frame may hold: radiance that is not finite, and that of a ray which meets a point light.
+r"""Pixels that a frame refuses: radiance that is not finite, and rays that meet a point light.
 
-With h the distance from the light to the ray, t that to its foot, and theta the angle at the light,
+With h the distance from the light to the ray, t the distance to the foot, and theta the angle at the light,
 
     J = exp(-sigma_t t)/h  int exp(-sigma_t h tan(theta/2 + pi/4)) p(-sin theta) dtheta.
 
@@ -9,12 +9,12 @@ As h goes to 0 the exponential under the integral goes to 1 at every angle below
 
     h J -> exp(-sigma_t t) int_{-pi/2}^{pi/2} p(-sin theta) dtheta,            pi exp(-sigma_t t) for p = 1:
 
-J grows like 1/h, and the pixel of a ray that meets the light is infinite; a ray that ends at the light has half of the
-integral or more, and is so too. With the light at the camera this is so of every pixel. A mean over a pixel is finite,
-since 1/h is integrable over a plane, but a frame holds the radiance of the centres.
+J grows like 1/h, and the pixel of a ray that meets the light is infinite; so is a ray that ends at the light, with half
+of the integral or more. With the light at the camera every pixel is infinite. A mean over a pixel is finite, since 1/h
+is integrable over a plane, but a frame holds the radiance of the centres.
 
-Positions are float32 numbers: of a light at the distance |l - o| nobody knows better than to 2^-24 of the largest
-coordinate where it is. Below that height, h is noise, and so is 1/h. Such a pixel is refused, by the distance.
+Positions are float32 numbers: the position of a light is known to 2^-24 of the largest coordinate at best. Below that
+height, h is noise, and so is 1/h. Such a pixel is refused, by the distance.
 """
 
 from typing import Any

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A frame: camera rays, the lit surface, and what a method adds, by groups of lights and parts of the image.
+"""A frame: camera rays, the lit surface, and the airlight of a method, by groups of lights and parts of the image.
 
 A frame is a list of groups of lights times a list of parts of the image. Each group is run by recorded functions
 (`drjit.freeze`), which record their kernels on the first call and replay them afterwards, so that a frame costs its
-kernels and little else; what groups and parts render is added up and put together. Most frames have one group and one
-part. A method whose arrays change their sizes from frame to frame is not frozen. All that moves (camera, lights,
-medium, shadow maps) is passed in as opaque arrays. What serves the next frame too: `realtime.frame.incremental`.
+kernels and little else; groups are added up and parts joined. Most frames have one group and one part. A method whose
+arrays change their sizes from frame to frame is not frozen. All that moves (camera, lights, medium, shadow maps) is
+passed in as opaque arrays. `realtime.frame.incremental` says what the next frame uses again.
 
-Groups: lights without extent are one where they are few, else each is one; each sample of an area light is one. Lights
-of one structure share their recorded functions. So the code of a kernel, and the time to compile it, do not grow with
-the lights: with five lights and two media in one kernel it had half a million operations, and took a minute. A method
-that looks at all lights together has one group.
+Groups: a few lights without extent are one group, more are one group each; each sample of an area light is a group.
+Lights of one structure share their recorded functions, so that the code of a kernel, and the time to compile it, do not
+grow with the lights: one kernel for five lights and two media had half a million operations, and took a minute. A
+method that looks at all lights together has one group.
 
-Parts: a large image of a method that computes each ray by itself is rendered in parts, one after the other: what a
-frame needs beside the image that it shows is then that of a part. Where the method needs the whole image, its stage is
-not frozen if that is large: a replay of Dr.Jit 1.5 frees what it made on its way only at its end, and filters make some
-twenty images on theirs.
+Parts: a large image of a method that computes each ray by itself is rendered in parts, one after the other: the
+intermediate arrays are then as large as a part. Where the method needs the whole image, its stage is not frozen if the
+image is large: a replay of Dr.Jit 1.5 frees intermediate arrays only at its end, and filters make some twenty
+intermediate images.
 """
 
 import gc
@@ -122,7 +122,7 @@ class FrameRenderer:
 
 @dataclass(frozen=True)
 class Frame:
-    """What a frame shows, as float arrays of shape (height, width[, 3])."""
+    """A rendered frame, as float arrays of shape (height, width[, 3])."""
 
     airlight: Any  #: in-scattered radiance [W/(m^2 sr)]
     surface: Any  #: radiance of the lit surface through the medium [W/(m^2 sr)]
@@ -132,10 +132,10 @@ class Frame:
 
 @dataclass(frozen=True)
 class Rendered:
-    """What a method has rendered, in the order of the lanes, not evaluated."""
+    """The result of a method, in the order of the lanes, not evaluated."""
 
     airlight: PerRay  #: in-scattered radiance [W/(m^2 sr)]
-    surface: PerRay  #: what is seen through it [W/(m^2 sr)]
+    surface: PerRay  #: radiance of the surface through it [W/(m^2 sr)]
     extra: Mapping[str, PerRay] | None = None  #: further layers by their names
     carried: Any = None  #: for the next frame
 

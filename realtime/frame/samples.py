@@ -38,9 +38,9 @@ def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:
 def render_samples(renderer: FrameRenderer, samples: int, progress: Callable[[float], None] | None = None) -> Frame:
     """Render the mean over some rays of each pixel.
 
-    `renderer`: from `realtime.frame.renderer.frame_renderer`. What a method makes of the scene is made again for each
-    ray. `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the fraction done. Returns `Frame`:
-    mean radiances; the distance is that of the first ray.
+    `renderer`: from `realtime.frame.renderer.frame_renderer`. The method prepares the scene again for each ray.
+    `samples`: rays of each pixel; 1 is `render_frame`. `progress`: called with the fraction done. Returns `Frame`: mean
+    radiances; the distance is that of the first ray.
     """
     camera, frame = renderer.scene.camera, None
     for number, (right, down) in enumerate(pixel_offsets(samples), 1):

@@ -5,13 +5,13 @@ Biri, Arques, Michelin 2006, section 5.1.2, with the extinction to the eye of eq
 
     L = rho I cos(theta_p) / (pi r_p^2) exp(-sigma_t r_p) exp(-sigma_t distance),
 
-zero where a shadow ray is blocked; of a directional light rho E cos(theta_p) / pi arrives at once. With bounded media
-both exponents are sums over the media that the two segments cross (`realtime.scene.media.bounded`). A one-sided
-surface is black from behind, as in Mitsuba's `diffuse`.
+zero where a shadow ray is blocked; for a directional light, rho E cos(theta_p) / pi replaces the first fraction. With
+bounded media both exponents are sums over the media that the two segments cross (`realtime.scene.media.bounded`). A
+one-sided surface is black from behind, as in Mitsuba's `diffuse`.
 
-What is cast depends on camera and geometry alone, and serves many frames (`realtime.frame.incremental`). So there are
-two recorded functions: one casts and shades, and hands on what it cast, which costs it nothing; one shades what was
-cast for another frame. To cast and to shade in two steps wherever something moved would take up to 7 % longer.
+Primary hits depend on camera and geometry alone, and serve many frames (`realtime.frame.incremental`). There are two
+recorded functions: one casts and shades, and hands on its hits at no cost; the other shades the hits of another frame.
+Casting and shading in two steps whenever something moved would take up to 7 % longer.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,7 +35,7 @@ _NO_DISTANCE = 1e-12  # what stands for the square of a distance of 0, of which 
 
 @dataclass(frozen=True)
 class Cast:
-    """What camera rays meet first: all of a frame that depends on the camera and the geometry alone."""
+    """The first hits of camera rays: all of a frame that depends on the camera and the geometry alone."""
 
     distance: Metres  #: infinite where there is nothing [m]
     triangle: PerRay | None = None  #: its number in the table of facets, where there is one
@@ -46,7 +46,7 @@ class Cast:
 
 @dataclass
 class VisibleSurface:
-    """What camera rays meet first, with all that its shading needs."""
+    """The first hits of camera rays, with all that their shading needs."""
 
     distance: Metres  #: infinite where there is nothing [m]
     point: Metres  #: [m]
@@ -120,7 +120,7 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
 def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Sequence[Light], depths, shadows: bool):
     """Return the sum of `lit_surface` over the points of an area light [W/(m^2 sr)].
 
-    What they have in common is taken out of the sum: their intensity, the albedo and the segment to the eye.
+    Common factors are taken out of the sum: the intensity, the albedo and the transmittance to the eye.
 
     `scene`, `surface`, `depths`, `shadows`: as for `lit_surface`; `medium`: without bounded media in it; `lights`: the
     points of one light.

@@ -21,10 +21,10 @@ murky 33/83 (1 + 50 u^32). Powers of u follow by parts, from the derivatives of 
     2 m T_{m+1} = (2 m - 1) T_m + a U_m - E B_m.
 
 Both steps hand on the errors of T_m and U_m: T's times (2 m - 1)/(2 m) < 1, and by way of U times a^2/(4 m (m - 1))
-over two steps, altogether at most (a/2)^n/n! after n steps and never more than exp(a/2). What each step adds is
-rounding of its terms, below that of T_1 and U_1: where E is large, T_m is much smaller than that, and lost, but then so
-is its fraction of J. So degree 32 is no harder than degree 8, until a is large: at a = 20 (murky) float32 still has
-four digits and float64 thirteen, at a = 60 float32 has none and float64 two.
+over two steps, altogether at most (a/2)^n/n! after n steps and never more than exp(a/2). Each step adds the rounding of
+its terms, which is below the rounding of T_1 and U_1: where E is large, T_m is smaller than this rounding and lost, but
+its fraction of J is then as small. Degree 32 is therefore no harder than degree 8, until a is large: at a = 20 (murky)
+float32 still has four digits and float64 thirteen, at a = 60 float32 has none and float64 two.
 
 **S(z).** For |z| < R the series S = exp(z) (-gamma - log z - sum_k (-z)^k/(k k!)), whose terms grow like exp(|z|);
 beyond, Stieltjes' continued fraction 1/(z + 1 - 1/(z + 3 - 4/(z + 5 - 9/(z + 7 - ...)))) from the tail up, n levels.

@@ -36,15 +36,15 @@ the left of the panel like exp(T t), with t the distance in widths of the panel 
 
 the optical depth that the segment would have, if all of it were as dense in v as its beginning. For a pure exponential
 the rule errs by less than T^2n (n!)^4 / ((2n + 1) (2n)!^3) of the first value, 4e-7 for n = 8 and T = 10.5: a panel may
-also have some T. So there are
+also have some T. Hence there are
 
     m = ceil(max((v1 - v0)/w, T/T1))
 
-equal panels. w is the largest width at which the rule leaves no more than 1e-6 of any panel, which each phase function
-knows of itself (`realtime.scene.rule_reach`); `tests/realtime/kernels/test_exact.py` tries random rays.
+equal panels. w is the largest width at which the error of the rule is at most 1e-6 of any panel, found for each phase
+function (`realtime.scene.rule_reach`); `tests/realtime/kernels/test_exact.py` tries random rays.
 
-**What they cost.** All rays of a packet take part in as many steps as the one that needs most, no more. Panels of a ray
-are equally wide: sinh and cosh of the offsets of the nodes are the same in each, and computed once. From the start of a
+**Cost.** All rays of a packet take part in as many steps as the one that needs most, no more. Panels of a ray are
+equally wide: sinh and cosh of the offsets of the nodes are the same in each, and computed once. From the start of a
 panel, with F = E/d and C = sqrt(1 + F^2) there,
 
     F' - F = F (cosh u - 1) + C sinh u,     C' = C cosh u + F sinh u,
@@ -52,16 +52,16 @@ panel, with F = E/d and C = sqrt(1 + F^2) there,
 are sums of positive terms, for its nodes and for its end, where the next begins. The extinctions of a coloured medium
 share all but the exponential: the range is that of the smallest, T that of the largest.
 
-**Short segments** beside their distance from the light have few nodes, in float32. Between the edges of shadows most
-segments are short. Over them the integrand of
+**Segments that are short** compared with their distance from the light have few nodes, in float32. Between the edges of
+shadows most segments are short. Over them the integrand of
 
     J = int_{x0}^{x1} exp(-sigma_t (x + r)) p/r^2 dx,     r^2 = s^2 + h^2,     s = x - foot,
 
-needs no substitution. Where r vanishes, s = +-i h, it has its singularities, and nowhere closer those of p: with E = (s
-+ r)/h, dE/ds = E/r, and E is never closer to +-i d, those of a lobe in E, than E itself. So over a segment of the
-length L all of them are r/L or more lengths away, r being the least distance between segment and light, and Gauss's
-rule converges as fast for every ray with the same r/L (by the theorem above). The exponent changes fastest at the end,
-by sigma_t (1 + s1/r1) a metre.
+needs no substitution. It has singularities where r vanishes, s = +-i h; the singularities of p are no closer: with E =
+(s + r)/h, dE/ds = E/r, and E is never closer to +-i d, the singularities of a lobe, than to 0. Over a segment of the
+length L all of them are therefore r/L or more lengths away, r being the least distance between segment and light, and
+Gauss's rule converges as fast for every ray with the same r/L (by the theorem above). The exponent changes fastest at
+the end, by sigma_t (1 + s1/r1) a metre.
 
 A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes, or eight, leave no more
 than 1e-6, wherever the segment lies (`realtime.scene.rule_reach` again). Nodes are places s0 + f L, s0 = x0 - foot:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What shaders do: fixed steps along the ray or in the angle at the light, by the midpoint rule or Gauss's.
+"""The rules of shaders: fixed steps along the ray or in the angle at the light, by the midpoint rule or Gauss's.
 
 * `uniform`: J ~ sum_k dx exp(-sigma_t (x_k + r_k)) p / r_k^2.
 * `equiangular` and `quadrature_theta`: with x = foot + h tan theta, dx/r^2 = dtheta/h, so J ~ sum_k w_k/h exp(-sigma_t

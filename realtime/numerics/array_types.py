@@ -21,7 +21,7 @@ from realtime.errors import InputError
 
 PRECISIONS = ("single", "double")
 
-# What arrays hold, for signatures. Dr.Jit has a class for each precision and backend, so their type is not checked.
+# Contents of arrays, for signatures. Dr.Jit has a class for each precision and backend, so their type is not checked.
 PerRay: TypeAlias = Any  #: one entry per ray: a number, a vector or a colour
 PerTile: TypeAlias = Any  #: one entry per tile of sixteen rays
 Metres: TypeAlias = Any  #: lengths [m]

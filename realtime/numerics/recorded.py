@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frozen functions that Python's garbage collector does not interrupt.
 
-While Dr.Jit records a function, nothing may be freed that the device must be told of, and no object may vanish that
-virtual calls go over: a Mitsuba scene that is collected in the middle ends the process, or the recording fails. What is
-garbage then is collected after the call.
+While Dr.Jit records a function, no memory of the device may be freed, and no object may vanish that virtual calls use:
+a Mitsuba scene that is collected in the middle ends the process, or the recording fails. Garbage is collected after the
+call.
 
-What the function raises while it is recorded ends the recording as if it had returned nothing, and is raised behind it:
-Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
+An exception in the function ends the recording as if the function had returned nothing, and is raised after the
+recording: Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
 
 **Tables of kernels.** A frozen function cannot take an array from the host, and reads one on the device only if it is
 among its inputs. A kernel may therefore have a `prepare`, ``prepare(Float, **parameters) -> tables``, which
-`prepared_by` gives it. Who freezes a function passes it the kernel that `prepare_kernel` returns as an input. A kernel
-without `prepare` knows nothing of this.
+`prepared_by` gives it. Code that freezes a function passes it the kernel that `prepare_kernel` returns as an input. A
+kernel without `prepare` needs none of this.
 """
 
 import gc

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What moves from frame to frame: lights, the medium, objects.
+"""Motion from frame to frame: lights, the medium, objects.
 
 A scene with something moved is a new `Scene` that shares all the rest. Its arrays have the types and sizes of the old
-ones and are opaque, so a frame that was recorded once serves for all. Only objects move in Mitsuba's own scene, which
-is told so that rays meet them; what was prepared for a method follows from `Scene.positions`.
+ones and are opaque, so a frame that was recorded once serves for all. Only objects move in Mitsuba's own scene, too, so
+that rays meet them; methods prepare their state from `Scene.positions`.
 """
 
 from collections.abc import Mapping, Sequence

@@ -11,9 +11,9 @@ of size 1,
 Rays start at the pinhole; the near clip plane does not cut the medium away (DESIGN section 6.3).
 
 A direction that is rounded to float32 misses its aim by 6e-8 of the distance: 3e-7 m at a light 5 m away, which is 1e-4
-of the height of a ray that passes it at half a pixel, and of the airlight there. So the camera's vectors and the aim of
-a ray have float64, in which `realtime.rays` computes once where it passes a light; all else has the precision
-of the scene.
+of the height of a ray that passes it at half a pixel, and of the airlight there. The camera's vectors and the aim of a
+ray therefore have float64, in which `realtime.rays` computes once where the ray passes a light; all else has the
+precision of the scene.
 """
 
 import math
@@ -33,7 +33,7 @@ SIDE = 4  #: of a tile [pixels]
 
 @dataclass(frozen=True)
 class PixelGrid:
-    """What kernels read of the size of an image; opaque, so that one kernel serves images of all sizes."""
+    """The size of an image for kernels; opaque, so that one kernel serves images of all sizes."""
 
     columns: Any  #: width of the image [pixels]
     inverse: Any  #: of that width, in float64 [1/pixels]

@@ -6,12 +6,12 @@ A grid of values of which the largest is rho_max gives the extinction
     sigma_t(p) = scale rho_max rho(p),        rho = values / rho_max  in [0, 1],
 
 linear between the centres of voxels (at (i + 1/2)/n of the grid's box, as Mitsuba has it) and constant beyond the
-outermost ones. `Clouds.sigma_t` is scale rho_max, the largest extinction: code that knows extinctions alone has a bound
-in it. `Clouds.density` says rho.
+outermost ones. `Clouds.sigma_t` is scale rho_max, the largest extinction: a bound for code that knows extinctions
+alone. `Clouds.density` holds rho.
 
-Mitsuba tells Python a volume's values, its box and, in words of six digits, its transform. A transform from the words
-whose translation is that which takes the middle of the box to the middle of the grid is right to 1e-6 of the grid.
-What is read is then compared with what Mitsuba itself finds at some points, so nothing else can be taken for a grid
+Mitsuba tells Python a volume's values, its box and, in words of six digits, its transform. The transform is read from
+these words, except that its translation takes the middle of the box to the middle of the grid; it is right to 1e-6 of
+the grid. The densities are then compared with Mitsuba's own at some points, so nothing else can be taken for a grid
 that is linear between voxels.
 """
 

@@ -6,8 +6,8 @@ infinity. The vector from a point P towards it is l - w P, in metres for w = 1 a
 follows from it alone holds for both: the foot and the height of a ray (`realtime.rays`), the projection of
 its shadow map (`realtime.shadow_maps.projection`), silhouettes and shadow planes, epipolar slices.
 
-What a directional light lights is media with bounds; the middle of the rectangle across it where these end stands for
-its place (`realtime.scene.directional_extent`).
+A directional light lights media with bounds; its place is the middle of a rectangle across it where the media end
+(`realtime.scene.directional_extent`).
 
 A light sample stands for a part of an area light (`realtime.area_lights`). In the direction w it has the intensity
 I0 max(0, n . w), n its normal: it lights the half space before its plane.

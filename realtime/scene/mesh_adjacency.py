@@ -7,8 +7,8 @@ an object moves only its vertices (`with_positions`).
 Vertices that coincide exactly are one vertex: meshes come with seams where texture coordinates differ. An edge is met
 by *half-edges*, one for each triangle at it, each with a direction. Half-edges of an edge are paired, opposite ones
 first, and each pair is one entry of `Occluders.edges`; one that finds no partner is an entry whose second triangle is
-`Occluders.none`. So a manifold edge is one entry, a border edge one with a single triangle, and an edge at which four
-triangles meet two entries: their sum is the same whichever way they are paired.
+`Occluders.none`. A manifold edge is therefore one entry, a border edge is one entry with a single triangle, and an edge
+at which four triangles meet is two entries, whose sum does not depend on the pairing.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading a Mitsuba scene: the camera, the medium, the lights, and what of them asks for code of its own.
+"""Reading a Mitsuba scene: the camera, the medium, the lights, and the features that need their own code.
 
-Mitsuba's own scene is the scene; nothing of ours is needed in it. What no method can do yet is refused by name. A frame
-runs the code that the features of a scene ask for, no other (DESIGN section 5).
+Any Mitsuba scene can be read; it needs no additions. Features that no method supports are refused by name. A frame runs
+only the code that the features of a scene need (DESIGN section 5).
 """
 
 import math
@@ -40,7 +40,7 @@ _UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that c
 
 @dataclass(frozen=True)
 class SceneFeatures:
-    """What a scene needs; every field chooses which code runs, and none is data."""
+    """The features of a scene; every field chooses which code runs, and none is data."""
 
     shadows: bool  #: there is something that can cast a shadow
     surfaces: bool  #: there is something that the camera can see
@@ -159,7 +159,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
 
 @dataclass(frozen=True)
 class _Bodies:
-    """What of a scene light meets."""
+    """The media and shapes that light meets."""
 
     medium: Medium
     meshes: tuple[ClosedMesh, ...]  #: bounds of media that are not all convex

@@ -2,13 +2,13 @@
 """How far rules of Gauss and Legendre with few nodes reach for a phase function, by the error of the rules themselves.
 
 Kernels integrate exp(-depth) p/r^2 by rules of fixed sizes, in one variable or another. How long a panel may be depends
-on the phase function: where it has its lobe, and how steeply that rises. So the rule is tried on the phase function
-itself, once and in float64: a panel of some length, wherever it may begin, by the rule and by one of `_MANY` nodes. The
-longest panel is the one beyond which the two differ by more than `LEFT`. Three kinds of panels there are,
+on the phase function: where it has its lobe, and how steeply the lobe rises. The rule is therefore tried on the phase
+function itself, once and in float64: a panel of some length, with any beginning, by the rule and by a rule of `_MANY`
+nodes. The longest panel is the one beyond which the two differ by more than `LEFT`. There are three kinds of panels:
 
-- in v, of `realtime.kernels.exact`, of which E = d sinh v: the integrand is p/(1 + E^2) d cosh v, E >= 0;
-- in x, of its short segments: p/r^2, with the length over the least distance r from the light, and all of a length
-  alike, whatever the height, which is 1 here;
+- in v, of `realtime.kernels.exact`, where E = d sinh v: the integrand is p/(1 + E^2) d cosh v, E >= 0;
+- in x, of its short segments: p/r^2, with the length over the least distance r from the light; the height, which is 1
+  here, does not matter;
 - in the tangent of the angle at the light from where the panel begins, of `realtime.scene.media.bounded_rays`.
 
 Extinction takes its fraction: each is tried in a vacuum and up to the depth that a panel of its kind may have.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What shading needs of every triangle of a scene, in two tables.
+"""The shading data of every triangle of a scene, in two tables.
 
 Mitsuba computes a surface interaction by calls over all kinds and instances of shapes and materials; where all of them
-are uniformly diffuse meshes, the number of the triangle says all, and reading it from a table costs a quarter of that.
-A scene with anything else is shaded by Mitsuba's interaction.
+are uniformly diffuse meshes, the number of the triangle is enough, and reading a table costs a quarter of the calls. A
+scene with anything else is shaded by Mitsuba's interaction.
 """
 
 from collections.abc import Collection

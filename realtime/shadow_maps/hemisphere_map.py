@@ -11,9 +11,9 @@ The maps hold 1/s of the first surface, at the corners of the texels. On a plane
 quadrant, as inverse depth is in a perspective map, and a point is lit where its own 1/s is not smaller.
 
 A point *on* a surface is compared with the value of the nearest corner, where the surface may be nearer to the light:
-by up to half of what 1/s changes from one corner to the next. So a second array holds the values less that, half of the
-slopes to the flatter side of rows and of columns: a plane never shadows itself, and an edge moves by less than half a
-texel.
+by up to half of the change of 1/s from one corner to the next. A second array therefore holds the values less half of
+the slopes to the flatter side of rows and of columns: a plane never shadows itself, and an edge moves by less than half
+a texel.
 
 The maps of N points follow one another, and all are cast at once, so that the number of kernels does not grow with N.
 """
@@ -31,7 +31,7 @@ from realtime.shadow_maps.shadow_map import check_size, tiled_corners
 
 @dataclass(frozen=True)
 class HemisphereMaps:
-    """What the rays of N light samples meet first, map by map, row by row."""
+    """The first hits of the rays of N light samples, map by map, row by row."""
 
     size: int  #: texels on a side
     inverse: Any  #: N (size + 1)^2 values 1/s, 0 where there is nothing [1/m]

@@ -3,8 +3,8 @@
 
 Billeter, Sintorn, Assarsson 2010, section 4, displace a grid by the depths of a shadow map; what lies between the light
 and the displaced grid is lit. A point has the projective coordinates (u, v, s) of `realtime.shadow_maps.projection`:
-planes stay planes and lines stay lines. So the triangles of the displaced grid are triangles over the texels of the
-map, linear in s; a camera ray is a straight line; and a point is lit where its s is above the height field. Where
+planes stay planes and lines stay lines. The triangles of the displaced grid are therefore triangles over the texels of
+the map, linear in s; a camera ray is a straight line; and a point is lit where its s is above the height field. Where
 nothing is hit s = 0: a vertex at infinity, or for parallel rays the end of the media.
 
 A texel is cut along the diagonal from its corner (0, 0) to (1, 1), into

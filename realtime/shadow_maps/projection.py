@@ -6,9 +6,9 @@ projections are one homogeneous map from (u, v, s) to the point (P, 1),
 
     (P, 1) ~ u (across, 0) + v (up, 0) + s (l, w) + (m, 1 - w).
 
-* w = 1: m is the axis, and P = l + (axis + u across + v up) / s. So s is the inverse of the planar depth [1/m].
+* w = 1: m is the axis, and P = l + (axis + u across + v up) / s. Hence s is the inverse of the planar depth [1/m].
 * w = 0: l = -axis, m is the middle of the rectangle behind which there are no media, and P = m + u across + v up - s
-  axis. So s is the height above that rectangle [m].
+  axis. Hence s is the height above that rectangle [m].
 
 It is linear in homogeneous coordinates, so planes stay planes and lines stay lines; the light itself is s = infinity,
 and a point is lit where its s is above that of the first surface. Where nothing is hit s = 0: at infinity, or at the
@@ -16,7 +16,7 @@ end of the media. Back from a point, with d its vector from l (w = 1) or m (w = 
 
     (u, v, s, 1) ~ (a, b, 1, c)  for w = 1,        (a, b, -c, 1)  for w = 0.
 
-A cube face has |across| = |up| = 1, the face of a spot tan(cutoff), so that its cone just fits; of a directional light
+A cube face has |across| = |up| = 1, the face of a spot tan(cutoff), so that its cone just fits; for a directional light
 they are half the sides of the rectangle [m].
 """
 

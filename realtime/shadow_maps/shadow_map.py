@@ -3,7 +3,8 @@
 
 A face is cut into size^2 texels over (u, v) in [-1, 1]^2 (`realtime.shadow_maps.projection`); a map holds at each of
 their (size + 1)^2 *corners* the distance *along the ray* from the light to the first surface [m], infinite where there
-is none. So the outermost values lie on the edges of the face, where the faces of a cube meet with the same values.
+is none. The outermost values therefore lie on the edges of the face, where the faces of a cube meet with the same
+values.
 
 The face of a directional light is a rectangle across it that just covers the media. It lies where the media end; the
 ray of (u, v) starts at position + u across + v up - depth axis, before all shapes, and goes along the axis. Surfaces
@@ -161,7 +162,7 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
 def _nearest(place, last: int):
     """Return the whole number below a place, from 0 to `last`, whatever the place is.
 
-    At the light itself, where a ray passes through it, (u, v) is no number. `dr.clip` lets that through, and as a whole
-    number it is 2^32 - 1: a load from there ends the process. So the upper bound is one of whole numbers.
+    Where a ray passes through the light itself, (u, v) is NaN. `dr.clip` lets NaN through, and as a whole number it is
+    2^32 - 1: a load from there ends the process. The upper bound is therefore one of whole numbers.
     """
     return dr.minimum(mi.UInt32(dr.maximum(place, 0)), last)

@@ -16,16 +16,16 @@ symmetric. w raises a mode by one, conj(w) lowers it, and conj(M1) has the modes
     A_m gains sin theta B_{|m-1|},   A_{-m} gains sin theta B_{m+1},   C_m gains sin theta (A_{m+1} + A_{-(m-1)}).
 
 S acts on each mode by itself and is the same for all four fields of a mode, and lines through the slab are the same for
-all modes: both are products of matrices, in which the fields of all suns stand side by side. All of it is linear, so
-that the light of a set in the directions that are wanted follows from the sum of the fields that its orders come from,
-once for each set.
+all modes: both are products of matrices, in which the fields of all suns stand side by side. The equations are linear,
+so the light of a set in the requested directions follows, once for each set, from the sum of the fields from which its
+orders are scattered.
 
 The sum of all orders above the last finite one obeys the same equations with S[M'] + S[M] and is solved for directly,
 mode by mode (`realtime.clouds.slab_orders.discrete_ordinates`).
 
-What the streams cannot resolve of the phase function is a peak of share f that goes on (delta-M). Light of order 1 is
-sharp, and the peak carries it on into order 2 as it is; later orders are smooth, and what reaches a direction that is
-wanted is taken with the moments of the phase function itself, which needs no peak.
+The part of the phase function that the streams cannot resolve is treated as a forward peak of the fraction f (delta-M).
+Light of order 1 is sharp, and the peak carries it unchanged into order 2; later orders are smooth, and the light in a
+requested direction uses the moments of the phase function itself, without a peak.
 """
 
 import math

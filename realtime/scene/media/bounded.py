@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Bounded media: homogeneous, convex and disjoint, in vacuum or in a homogeneous medium around them.
 
-A ray enters and leaves each of them once. What its segments cross follows from these two distances, found once a ray
-(`crossed`), and what the path to a light crosses from `realtime.scene.media.light_paths`; an optical depth is
+A ray enters and leaves each medium once. The lengths of its segments in the media follow from these two distances,
+found once a ray (`crossed`), and those of light paths from `realtime.scene.media.light_paths`; an optical depth is
 
     tau = sigma_0 length + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in vacuum.
 """
@@ -168,7 +168,7 @@ class BoundedMedia(Homogeneous):
         pieces = camera_pieces(self, rays)
         if form == "exact" or polynomial is None:
             return BoundedRays(self, light, rays, geometry, kernel, pieces, form)
-        # What it refuses must be raised here, not in a branch. Nothing is computed that nobody reads.
+        # A polynomial must refuse here, not in a branch. Dr.Jit computes nothing that nobody reads.
         zero = type(geometry.height)(0)
         for own in self.bounded_media:
             segment = own.medium.sigma_t[0], zero, own.mean_distance, form == "printed"

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight in bounded media: homogeneous, convex and disjoint, in vacuum or in another medium.
 
-A ray runs through *pieces*, the bounded media that it meets and, where the air is not clear, the gaps between them. In
-a piece of the medium j, over a lit segment of it,
+A ray runs through *pieces*, the bounded media that it meets and, unless they are in vacuum, the gaps between them. In a
+piece of the medium j, over a lit segment of it,
 
     J = int exp(-tau_camera(x) - tau_light(x)) p / r^2 dx,
 
-without r of a light at infinity, with the true optical depths on both paths. Camera: what is behind it when the ray
-enters the piece is one number a ray, then sigma_j (x - x_j). Light: the path from the light to x has the length l_k in
-the medium k (`realtime.scene.media.light_paths`), and
+without r^2 for a light at infinity, with the true optical depths on both paths. Camera: the depth up to the piece is
+one number a ray, and sigma_j (x - x_j) is added in it. Light: the path from the light to x has the length l_k in the
+medium k (`realtime.scene.media.light_paths`), and
 
     tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in vacuum.
 
@@ -41,9 +41,9 @@ x - x_n + R with x = t + h tan theta gives
 
 That is ``media=paper``. ``media=printed`` is the first equation with t for the r before the integral, which alone can
 be meant, and the exponent within it as it stands. A kernel may have a polynomial for either
-(`realtime.scene.media.published_form`); without one they are summed over panels. The paper has each medium alone: the
-light reaches a body through vacuum, however many bodies are before it. What is before the body on the camera's side
-is one factor for a ray, and is kept.
+(`realtime.scene.media.published_form`); without one they are summed over panels. The paper treats each medium alone:
+the light reaches a body through vacuum, however many bodies are before it. The transmittance between the body and the
+camera is one factor for a ray, and is kept.
 
 References
 ----------

@@ -19,10 +19,10 @@ the largest of others, the *envelopes*, bend where another line takes over, and 
 the two is 0, and where they meet. The least of lines is concave: beyond a place only steeper falling lines can take
 over from the one that is least there, and the first of them to cross it does. One pass over the planes finds it.
 
-The facets through which the light comes in tile the medium as the light sees it. So a path that meets the medium has
-its plane by going from facet to facet while a neighbour has less: on the straight way from a point of the facet k to
-that of the path, the neighbour beyond the edge where k is left has less from there on, since the difference is linear.
-Where no neighbour on the light's side has less, and none on the other has more, the crossing lies in the facet.
+The facets through which the light comes in tile the medium as the light sees it. A path that meets the medium therefore
+finds its plane by going from facet to facet while a neighbour has less: on the straight way from a point of the facet k
+to that of the path, the neighbour beyond the edge where k is left has less from there on, since the difference is
+linear. Where no neighbour on the light's side has less, and none on the other has more, the crossing lies in the facet.
 Otherwise the path misses the medium, and e_0 > e_1 says so. The walk begins at the facet in the direction, from the
 medium's centre, of the place where the path crosses the sphere around it. For points within the medium the next plane
 along a ray shares an edge with the last one, too.
@@ -166,7 +166,7 @@ class LightPaths:
     def _walk(self, x) -> Envelopes:
         """Return the envelopes of paths to x that meet the medium, from facet to facet; others have e_0 > e_1.
 
-        Of points within the medium only the plane of the least is looked for.
+        For points within the medium only the plane with the least e is searched.
         """
         step, sides = self._tighter(x), 1 if self.own else 2
         if self.bounded.count <= _FEW:

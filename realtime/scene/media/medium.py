@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What every medium answers: the protocol between media and all that renders in them (the page of this room).
+"""The interface of every medium, which all code that renders in media uses (see the page of this room).
 
 The plainest medium is here too: homogeneous, without bounds. Its extinction is the same everywhere, so integrals leave
-out albedo sigma_t, and those of a grey medium are one number. Its airlight is the business of a kernel, a function
+out albedo sigma_t, and integrals of a grey medium are one number. Its airlight is the business of a kernel, a function
 ``kernel(geometry, x0, x1, medium, light) -> J [1/m]`` (`realtime.kernels.registry`), which attenuates by exp(-sigma_t
 (x + r)).
 """
@@ -42,7 +42,7 @@ class Rays:
 
 
 class Medium(ABC):
-    """What fills space. Media are frozen dataclasses derived from it; see the page of this room."""
+    """The base class of media, which are frozen dataclasses; see the page of this room."""
 
     albedo: Any  #: single-scattering albedo, RGB [1]; its type is that of colours
     phase: Any  #: the phase function
@@ -132,8 +132,8 @@ class Medium(ABC):
         geometry
             Where they pass the light, a `realtime.rays.RayGeometry`.
         kernel, form
-            What else decides on the integral, in media that ask: `realtime.kernels`, and the form of
-            `realtime.scene.media.bounded_rays`.
+            The kernel of `realtime.kernels`, and the form of `realtime.scene.media.bounded_rays`, for media that use
+            them.
         """
         return LitRays(self, light, rays, geometry, kernel)
 
