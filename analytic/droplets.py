@@ -17,28 +17,29 @@ radius, (gamma + 2)^2 for gamma (gamma + 1), and lacks Q. For gamma = 2 the one 
 times too little. `Optics.printed_extinction` is the printed value.
 
 **Sizes.** With u = r/r_n both averages have the weight u^(gamma + 1) exp(-u). The rule is the midpoint rule between the
-quantiles 1e-9 and 1 - 1e-9 of this weight. A sphere without absorption has resonances too narrow for any rule: what
-they hold is sampled at random, and the error falls as slowly as the number of sizes grows. So the sizes of the rule are
-part of the definition of a phase function here, and `realtime.droplets` takes the same; `SIZES` says what more of them
-would change.
+quantiles 1e-9 and 1 - 1e-9 of this weight. A sphere without absorption has resonances too narrow for any rule: the rule
+samples them at random, and the error falls as slowly as the number of sizes grows. The sizes of the rule are therefore
+part of the definition of a phase function here, and `realtime.droplets` takes the same sizes; `SIZES` says what more
+sizes would change.
 
-**Phase function.** |S_1|^2 + |S_2|^2 of a sphere of N terms is a polynomial of degree 2 N - 1 at most in the cosine:
-2 S_1 and S_2 are sums of pi_n and tau_n, polynomials of degree n - 1 and n, and products of two of these have at most
-twice that degree. So Gauss-Legendre nodes, one more than N_largest each way, give all its Legendre moments exactly,
+**Phase function.** |S_1|^2 + |S_2|^2 of a sphere of N terms is a polynomial of degree 2 N - 1 at most in the cosine: 2
+S_1 and S_2 are sums of pi_n and tau_n, polynomials of degree n - 1 and n, and products of two of these have at most
+twice that degree. Gauss-Legendre nodes, one more than N_largest each way, therefore give all its Legendre moments
+exactly,
 
     p(cos) = sum_l (2 l + 1) chi_l P_l(cos),      chi_l = (1/2) int p P_l dcos,      chi_0 = 1, chi_1 = g,
 
-and the series is the function, at any cosine. Values come from a cubic spline over the angle through values of the
+and the series equals the function at any cosine. Values come from a cubic spline over the angle through values of the
 series at sixteen angles for each of its terms; the spline differs from the series by less than 1e-8 of the value.
 
 **The modified phase function** (the paper's appendix, after Lenoble 1985) cuts the forward peak: light that a droplet
-deflects by less than 5 degrees counts as not scattered. Let f be the fraction of the light that is cut out of p. What
-is left is p_cut/(1 - f), of mean 1, and, so that the same light is scattered elsewhere as before,
+deflects by less than 5 degrees counts as not scattered. Let f be the fraction of the light that is cut out of p. The
+rest is p_cut/(1 - f), of mean 1, and, so that the same light is scattered into other directions as before,
 
     kappa' = (1 - albedo f) kappa,        albedo' = albedo (1 - f)/(1 - albedo f).
 
 The paper prints f = 0.5, "converted into 50 % lowered density", and a peak of 51 % of the energy. Here nothing is left
-below the angle, and the density is lowered by what is cut.
+below the angle, and the density is lowered by the fraction that is cut.
 
 Light of order 1 must not lose its peak, nor count it twice: with kappa' and albedo' it takes the full phase function
 divided by 1 - f (the correction of Nakajima and Tanaka 1988, TMS), since albedo' kappa' p/(1 - f) = albedo kappa p.

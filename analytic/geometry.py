@@ -33,10 +33,10 @@ def foot_and_height(origin: ArrayLike, direction: ArrayLike, light: ArrayLike) -
     """Return the foot and height of rays over a light.
 
     `origin`, `light`: points [m], of shape (n, 3), or (3,) for one that all share. `direction`: directions of the rays,
-    of shape (n, 3) or (3,), of length 1 to float32 rounding. What is left of a length other than 1 is divided out, so
-    that distances are along the unit vector. Returns `foot`, `height`: signed distance of the foot point from the
-    origin [m] and distance from the light to the ray [m], of shape (n,). Raises InputError for arrays of other shapes,
-    numbers that are not finite, or directions that are not of length 1 (to 1e-5).
+    of shape (n, 3) or (3,), of length 1 to float32 rounding. Directions are divided by their length, so that distances
+    are along the unit vector. Returns `foot`, `height`: signed distance of the foot point from the origin [m] and
+    distance from the light to the ray [m], of shape (n,). Raises InputError for arrays of other shapes, numbers that
+    are not finite, or directions that are not of length 1 (to 1e-5).
     """
     o, d, p = (_points(name, value) for name, value in (("origin", origin), ("direction", direction), ("light", light)))
     length = np.sqrt(np.sum(d * d, axis=-1))

@@ -52,7 +52,7 @@ _LARGEST = 2e4  # size up to which the recurrences were tried
 
 @dataclass(frozen=True)
 class Efficiencies:
-    """What spheres take out of a beam, over their geometric cross sections; arrays of the shape of the sizes."""
+    """Cross sections of spheres over their geometric cross sections; arrays of the shape of the sizes."""
 
     extinction: Array  #: Q_ext [1]
     scattering: Array  #: Q_sca [1]

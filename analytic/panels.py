@@ -21,8 +21,8 @@ Each panel is integrated by the 21 nodes of Kronrod, its error estimated by the 
 them: the estimate is that of the worse rule, an upper bound by many digits for smooth integrands. Panels of segments
 that miss the tolerance are halved until they meet it.
 
-A table of a phase function cuts a segment at each of its entries. Of these narrow panels, of 0.1 at most, rho is 63 or
-more, and Gauss's three nodes are right to rho^(-6) = 2e-11: Kronrod's seven do for a third of the work.
+A table of a phase function cuts a segment at each of its entries. These narrow panels, of 0.1 at most, have a rho of 63
+or more, and Gauss's three nodes are right to rho^(-6) = 2e-11: Kronrod's seven suffice for a third of the work.
 """
 
 from collections.abc import Callable, Iterator
@@ -64,7 +64,7 @@ class _Segments:
 
 @dataclass(frozen=True)
 class _Integrand:
-    """What all segments share."""
+    """The parameters that all segments share."""
 
     phase: PhaseFunction
     shadow_scale: float
@@ -140,7 +140,7 @@ def log_distance(foot: Array, height: Array, x0: Array, x1: Array) -> tuple[Arra
 
         w1 - w0 = asinh( (x1 - x0) (s0 + s1) / (s1 r0 + s0 r1) ),
 
-    all sums being of one sign. Of a segment that holds the foot it is the sum of two positive terms.
+    all sums being of one sign. The width of a segment that holds the foot is the sum of two positive terms.
 
     `foot`, `height`, `x0`, `x1`: as in `airlight_segments`, arrays of one shape [m]. Returns `start`, `scale`, `width`,
     `height`: w0, E at w0, w1 - w0, which may be infinite [1], and the height, above 0 [m].

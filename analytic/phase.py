@@ -188,7 +188,7 @@ class PhaseFunction:
 
     @property
     def _scattering(self) -> Optics | Modified:
-        """What droplets do to light; computed once for each kind."""
+        """The optics of the droplets; computed once for each kind."""
         full = optics(self.droplets, self.wavelength)
         return full if self.name == "mie" else Modified(full)
 

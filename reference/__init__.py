@@ -3,11 +3,11 @@
 
 Three estimators lead to it. `quadrature` finds the lit intervals of every camera ray by exact geometry
 and sums airlight integrals over them in float64. `monte_carlo.single_scatter` samples the same integral as an
-integrator of Mitsuba. `monte_carlo.volpath` runs Mitsuba's volumetric path tracer, which nobody here wrote.
+integrator of Mitsuba. `monte_carlo.volpath` runs Mitsuba's volumetric path tracer, independent of this project.
 
-None of the three imports another. What two of them share is the reading of the scene (`scene`: coefficients, lights,
-the rays through pixel centres, as Mitsuba gives them), the class of errors for the user, and between the two that
-sample the means over batches. Reading a scene is no derivation; all that is derived from these facts, from the planes
+None of the three imports another. They share the reading of the scene (`scene`: coefficients, lights,
+the rays through pixel centres, as Mitsuba gives them), the class of errors for the user, and, in the two that
+sample, the means over batches. Reading a scene is no derivation; all that is derived from these facts, from the planes
 of directional lights to the crossings of bounds, belongs to one estimator alone. `tests/test_independence.py` follows
 all imports to their end and holds this list.
 

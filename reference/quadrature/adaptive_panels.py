@@ -31,7 +31,7 @@ _EPS = float(np.finfo(float).eps)
 
 
 class Integrand(Protocol):
-    """What a medium scatters along pieces: exp(-tau) p, to be multiplied by albedo sigma_t."""
+    """The integrand of a medium along pieces: exp(-tau) p, to be multiplied by albedo sigma_t."""
 
     @property
     def factor(self) -> Array:

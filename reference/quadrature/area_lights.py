@@ -7,13 +7,13 @@ With the points y on the surface of a light of radiance Le the radiance along a 
     cos_l = n . (o + x w - y) / r.
 
 The inner integral is that of a point light with a cosine for its profile, cut where the ray passes the plane of y and
-n. It is continuous in y where the visibility from a surface is not, so that few samples do. Surfaces at the end of a
-ray receive, from samples of their own,
+n. It is continuous in y where the visibility from a surface is not, so that few samples suffice. Surfaces at the end of
+a ray receive, from samples of their own,
 
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 
-f cos_s by Mitsuba's `BSDF.eval`. Of a flat light V is exact along sections, from which samples are drawn where it is 1.
-A few sections, always the same, say first which points see a flat light only in part: these get sections in pairs.
+f cos_s by Mitsuba's `BSDF.eval`. For a flat light V is exact along sections, and samples are drawn where V is 1. A few
+fixed sections first find the points that see only a part of a flat light: these get sections in pairs.
 `reference.quadrature.light_samples` draws both kinds of samples, `reference.quadrature.replicates` says how many a ray
 gets: eight independent scramblings each give a mean, and their spread the standard error.
 """
@@ -354,8 +354,8 @@ Result = TypeVar("Result")
 def done_ahead(work: Callable[[Task], Result], tasks: Iterable[Task], *, workers: int) -> Iterator[Result]:
     """Yield the results of some work in the order of its tasks, while threads do those that follow.
 
-    NumPy works on one processor, and lets go of Python's lock while it does. What calls Dr.Jit stays with the caller:
-    that has threads of its own.
+    NumPy works on one processor and releases Python's lock meanwhile. Code that calls Dr.Jit stays with the caller, as
+    Dr.Jit has its own threads.
 
     `work`: a function of one task that calls NumPy alone; `tasks`: in order; they are made by the caller's thread;
     `workers`: threads; as many results and one more are kept at once. Raises what the work raises, when its

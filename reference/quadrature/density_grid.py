@@ -3,7 +3,7 @@
 
 Along a camera ray the extinction has kinks at the faces of cells, so stretches are cut there. The depth of the path to
 the light is smooth in the distance, except where that path sweeps over an edge of the grid: its second derivative jumps
-there. So a pixel has an estimate of its error, the difference of the two rules, and no bound.
+there. A pixel therefore has an estimate of its error, the difference of the two rules, and no bound.
 """
 
 from dataclasses import dataclass, field, replace

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What fills a scene: the one door for media in the quadrature.
+"""Media in the quadrature: the one interface, `Field`.
 
-Everything else asks a field: the sums over lit intervals, surfaces, what the camera sees of lights, and bounds. A new
-medium is a class with the four members of `Field` in a file of its own, and a line in `field_of`. Where its integrals
-have no closed form, `sums` cuts the stretches into smooth pieces (`whole` and `cut` of `reference.quadrature.pieces`),
-states its integrand, and gives both to `sum_pieces` of `reference.quadrature.adaptive_panels`: that knows lights,
+All other code uses a field: the sums over lit intervals, surfaces, lights that the camera sees, and bounds. A new
+medium is a class with the four members of `Field` in its own file, and a line in `field_of`. Where its integrals have
+no closed form, `sums` cuts the stretches into smooth pieces (`whole` and `cut` of `reference.quadrature.pieces`),
+states its integrand, and gives both to `sum_pieces` of `reference.quadrature.adaptive_panels`, which treats lights,
 tolerances and edges. `reference.quadrature.density_grid` does so.
 """
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 class Field(Protocol):
-    """What a medium, or all media of a scene together, answer."""
+    """The interface of a medium, or of all media of a scene together."""
 
     @property
     def strongest(self) -> Array:

@@ -46,7 +46,7 @@ _RAYS = 4096  # rays at once
 
 @dataclass(frozen=True)
 class HomogeneousField:
-    """What surrounds the camera, and media in disjoint convex bounds; a field (`reference.quadrature.fields`)."""
+    """The medium around the camera, and media in disjoint convex bounds; a field (`reference.quadrature.fields`)."""
 
     reference: ReferenceScene
 

@@ -25,7 +25,7 @@ _END = 1e-6  # relative: an interval that ends this close to where a ray was loo
 
 @dataclass(frozen=True)
 class LightAirlight:
-    """What one light sends into the rays."""
+    """The airlight of one light in the rays."""
 
     radiance: Array  #: in-scattered, (rays, 3) [W/(m^2 sr)]
     bound: Array  #: of its error, (rays, 3) [W/(m^2 sr)]
@@ -90,7 +90,7 @@ def lit_sums(
 def _sun_sums(reference: ReferenceScene, light: DirectionalLight, found: LitRays) -> tuple[Array, Array]:
     rays, lit = found.rays, found.lit
     _, _, high = stretches = sun_stretches(reference, found)
-    # What the uncertainty of coordinates is worth on a ray, through an edge or a kink; at most all of the ray.
+    # The effect on a ray of the uncertainty of coordinates, through an edge or a kink; at most all of the ray.
     scale = np.maximum(coordinates(rays, found.shapes), lit.high.max(initial=0.0) / rays.height)
     edge = np.minimum(lit.edge * scale, np.bincount(lit.ray, high - lit.low, len(found.distance)))
     terms = Terms(edge=edge, rounding=np.finfo(float).eps * scale)
@@ -148,10 +148,10 @@ def sun_stretches(reference: ReferenceScene, found: LitRays) -> Stretches:
 
 
 def worth_of_doubt(reference: ReferenceScene, rays: Rays, lit: LitIntervals) -> Array:
-    """Return the most that what shadow rays left in doubt can be worth for a light of strength 1, (rays, 3).
+    """Return the largest airlight of the parts that shadow rays left in doubt, for a light of strength 1, (rays, 3).
 
     In theta the integrand of J is exp(-sigma_t (x + r)) p / height; the exponential is at most one, and the phase
-    function at most its largest value. Of a directional light it is exp(-tau) p, in the distance.
+    function at most its largest value. For a directional light it is exp(-tau) p, in the distance.
     """
     worth = np.zeros((len(rays.foot), 3))
     ray, part = lit.doubt

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Samples of area lights: points of the light that suit one ray, and sections that suit one surface point.
 
-**Along a ray.** A point y of the light at the height h over the ray sends into it J(y), which grows like 1/h: points
-drawn evenly on the light leave a peak beside the light that no number of them resolves. In half planes about the ray,
-with phi the azimuth of such a half plane and l the arc length along the curve in which it cuts the light,
+**Along a ray.** A point y of the light at the height h over the ray sends J(y) into it, which grows like 1/h: points
+drawn evenly on the light leave a peak next to the light that no number of points resolves. In half planes about the
+ray, with phi the azimuth of such a half plane and l the arc length along the curve in which it cuts the light,
 
     dA = h dphi dl / n_in,        n_in the length of the part of the normal within the half plane,
 
-and h J(y) is bounded however close the ray passes: an unbounded ray in a clear medium receives (1 + cos) n_in from y,
-cos that of the angle in the half plane between normal and ray. So samples are drawn by phi and l. These are polar
-coordinates about the ray, the same for all of its points, and lit intervals stay those of one point of the light.
+and h J(y) is bounded however close the ray passes: without extinction an unbounded ray receives (1 + cos) n_in from y,
+with cos the cosine of the angle in the half plane between normal and ray. Samples are therefore drawn by phi and l.
+These are polar coordinates about the ray, the same for all of its points, and each sample has the lit intervals of one
+point light.
 
 A half plane cuts a rectangle, a triangle and a disk in a segment, a sphere of radius R in a circle of radius rho. There
 dA = R h dphi db with the angle b on the circle. The azimuths of a disk or sphere that the line of the ray misses are
@@ -20,30 +21,31 @@ those of the quadratic form
 e the unit normal of the half plane, c the way from the ray to the centre. With its eigenvalues -a <= 0 < b and the
 angle delta from the middle, half the chord is proportional to sqrt(S^2 - sin^2(delta)), S^2 = a/(a + b); with
 sin(delta) = S sin(g) that is a smooth function of g and periodic, as what follows from it, and samples are even in g. A
-line that meets the light has all azimuths, and samples that are even in phi. Of a polygon phi follows the length of the
-section, which is tabulated: the density is linear between the nodes, at corners of the light and between them, and the
-weight of a sample is by the density itself, so that the table costs no accuracy.
+line that meets the light has all azimuths, and samples that are even in phi. For a polygon phi follows the length of
+the section, which is tabulated: the density is linear between nodes, at corners of the light and between them, and the
+density itself weights a sample, so that the table costs no accuracy.
 
 **From a surface point.** The solid angle about any axis through the point is dphi dcos(psi). In the same half planes,
-about an axis across the way to the light, the section of a flat light has a range of cosines. What the point sees of it
-is exact, by the same intervals as those of a ray under a light: the section is the ray, the point the light. A sample
-is drawn evenly in the cosine from what is seen, and stands for that. So the sum is over a function of phi and of a
-place in what is seen that is continuous where the visibility of points is not.
+about an axis across the way to the light, the section of a flat light has a range of cosines. The visible part of the
+section is exact, by the same intervals as on a ray under a light: the section is the ray, the point the light. A sample
+is drawn evenly in the cosine from the visible part, and stands for all of it. The sum is therefore over a function of
+phi and of a place in the visible part, which is continuous where the visibility of points is not.
 
 Where the light is seen as a whole, phi is drawn by the length of the range: evenly in the solid angle (for rectangles
 Urena, Fajardo, King 2013, An area-preserving parametrization for spherical rectangles, has this in closed form). In a
 penumbra the function has kinks, at corners of the light and where an edge of a shadow meets its outline, and is smooth
-between: of that mirrored pairs (`reference.quadrature.replicates`) leave N^-2. By length phi would go as the root of
-the number at both ends, where sections begin at a corner, and pairs would leave N^-3/2. So there the azimuths of a
-rectangle are even, and its whole solid angle, which is known, is a control variate. Behind half a plane before a
-rectangle, 64 points in each of eight replicates leave 4.9e-3 of a penumbra, 64 sections by length 1.3e-3, even pairs of
-them 2.2e-4; 256 sections leave 2.4e-4 and 2.4e-5, as root mean squares over seeds. Sections across an edge of the
-shadow would leave next to nothing, but those along it are seen as a whole or not and leave 1/N: so the axes are turned.
-A sphere fills a cone of directions, where sections would be arcs: there each is so short that it is seen or not.
+between: of that mirrored pairs (`reference.quadrature.replicates`) leave N^-2. Drawn by length, phi would go as the
+root of the number at both ends, where sections begin at a corner, and pairs would leave N^-3/2. In a penumbra the
+azimuths of a rectangle are therefore even, and its whole solid angle, which is known, is a control variate. Behind half
+a plane before a rectangle, 64 points in each of eight replicates leave 4.9e-3 of a penumbra, 64 sections by length
+1.3e-3, even pairs of them 2.2e-4; 256 sections leave 2.4e-4 and 2.4e-5, as root mean squares over seeds. Sections
+across an edge of the shadow would leave next to nothing, but sections along it are visible as a whole or not at all and
+leave 1/N: hence the axes are turned. A sphere fills a cone of directions, where sections would be arcs: there each is
+so short that it is seen or not.
 
-**On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`), and what is left of
-it serves within the triangle: along rays as above in one that is near, evenly over its area in others. For surface
-points each has a short section, evenly over the area.
+**On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`), and the rest of the
+coordinate serves within the triangle: along rays as above in one that is near, evenly over its area in others. For
+surface points each has a short section, evenly over the area.
 """
 
 from dataclasses import dataclass, fields
@@ -187,9 +189,9 @@ def sections_for_points(
     """Return sections of a light for surface points that lie before it, point by point, even in the solid angle.
 
     `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square, (samples, 2) [1], the
-    same for all surface points. Of flat lights the second number is left for the place in what is seen of a section.
-    `turn`: by what angle the axis is turned about the way to the light [rad]; `even`: of rectangles the azimuths are
-    even, and not the solid angle.
+    same for all surface points. For flat lights the second number is left for the place in the visible part of a
+    section. `turn`: the angle by which the axis is turned about the way to the light [rad]; `even`: whether rectangles
+    have even azimuths instead of even solid angles.
     """
     if light.kind == "mesh":
         chosen = choose_for_points(light, place, square)
@@ -197,7 +199,7 @@ def sections_for_points(
     way = light.centre - place
     if light.kind == "sphere":
         return _in_cone(light, place, square)
-    # Of both sides of the light that which lies more across the way to it.
+    # The side of the light that lies more across the way to it.
     sides = light.frame[:2]
     side = sides[np.argmin(np.abs(way @ sides.T), axis=1)]
     axis = side - (np.sum(side * way, axis=1) / np.sum(way * way, axis=1))[:, None] * way

@@ -12,13 +12,13 @@ small. With n_k = 2^k n_0, means of variance sigma_k^2 and S_k^2 = sigma_k^2 chi
 where a round that stops by chance has an S_k below e and far below sigma_k. For independent rounds with S ~ 1/N this is
 92.4 to 95 % as e/sigma_0 varies, for S ~ N^-1/2 it is 90.4 to 95 %: too few.
 
-So a pilot decides, and is not counted: eight replicates of other scramblings, of four times as many points each time,
-until they foresee a standard error that is small enough at not more than four times their points. N is then independent
-of the points that count, and Student's distribution holds whatever N is; all costs 1.2 to 1.7 times as much as the
-points that count. They foresee S ~ N^-5/4, a little less than the N^-3/2 of scrambled nets of smooth functions (Owen
-1997, Scrambled net variance for integrals of smooth functions), which is what fog has. Where that is too hopeful, the
-error that is stated is larger than the one that was asked for, and right. A ray that could not reach the error with all
-its points at that rate gets them all at once.
+A pilot therefore decides, and is not counted: eight replicates of other scramblings, with four times as many points
+each time, until they predict a small enough standard error at not more than four times their points. N is then
+independent of the points that count, and Student's distribution holds for every N; the total cost is 1.2 to 1.7 times
+that of the points that count. The pilot assumes S ~ N^-5/4, a little slower than the N^-3/2 of scrambled nets for
+smooth functions (Owen 1997, Scrambled net variance for integrals of smooth functions), which fog reaches. Where this is
+too optimistic, the stated error is larger than the requested one, and right. A ray that could not reach the error with
+all its points at that rate gets them all at once.
 
 **Points of the unit square.** They are Sobol's in base 2, scrambled at random: in each coordinate a digit is flipped or
 not by a coin of its own for each value of the digits before it (Owen 1995, Randomly permuted (t,m,s)-nets and
@@ -32,9 +32,9 @@ in a penumbra, where nested scrambling has -0.2, and intervals that hold in 99 %
 anywhere in its stratum. Two points of a stratum of twice the width, mirrored at its middle, leave nothing of what is
 linear there, and N^-5/2 of what is smooth; at a kink they leave N^-2 (Owen 2008, Local antithetic sampling with
 scrambled nets). With the other coordinate mirrored, 1 - v, what is linear in that goes too. Points that are pairs for
-one N are none for another: so each count of points is a set of its own.
+one N are none for another: each number of points therefore has its own set.
 
-What a sphere sends is smooth, and periodic in an angle. There a lattice does better, (i, 1555 i)/N modulo 1, with a
+The light of a sphere is smooth, and periodic in an angle. There a lattice does better, (i, 1555 i)/N modulo 1, with a
 random shift, folded in the first coordinate by a tent, u = 1 - |2 t - 1|, and in the order of the mirrored digits of i,
 so that every power of two of them is a lattice. For every N from 16 to 16384 the shortest frequency that all N points
 see alike is at least 0.76 sqrt(N).

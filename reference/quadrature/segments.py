@@ -34,7 +34,7 @@ _BLOCK = 1 << 21  # numbers in one block of rays and edges
 
 @dataclass(frozen=True)
 class Segments:
-    """What parts of rays lie in which medium; arrays of shape (slots, rays), empty parts have start >= end."""
+    """The parts of rays and their media; arrays of shape (slots, rays), empty parts have start >= end."""
 
     start: Array  #: distance from the origin [m]
     end: Array  #: may be infinite [m]

@@ -31,7 +31,7 @@ UNBOUNDED = float(np.finfo(float).max)  #: how far the shadow segment of a direc
 
 @dataclass(frozen=True)
 class SurfaceHits:
-    """What the pixel-centre rays hit."""
+    """The hits of the pixel-centre rays."""
 
     distance: Array  #: (pixels,), infinite where nothing is hit [m]
     interaction: Any  #: Mitsuba's surface interactions

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A Mitsuba scene as numbers in float64: what all estimators of the reference may share.
 
-These are facts that Mitsuba gives when it is asked. What follows from them along a ray is derived elsewhere.
+These are facts that Mitsuba reports. Each estimator derives for itself what follows from them along a ray.
 
 Read in this order:
 
@@ -10,7 +10,7 @@ Read in this order:
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: area lights, read and checked;
-- `varying.py`: what media have whose extinction differs from place to place;
+- `varying.py`: what media of varying extinction have in common;
 - `height_fog.py`: media whose density depends on height;
 - `density_grid.py`: media whose density is a grid;
 - `read.py`: the whole scene: lights, media, camera rays;

@@ -52,12 +52,12 @@ class ReferenceAreaLight:
 
     @property
     def radius(self) -> float:
-        """Of a disk or a sphere; of a rectangle that of the circle around it [m]."""
+        """Radius of a disk or sphere, or of the circle around a rectangle [m]."""
         return float(np.hypot(*self.half)) if self.kind == "rectangle" else float(self.half[0])
 
     @property
     def area(self) -> float:
-        """Of the surface that emits [m^2]."""
+        """Emitting area [m^2]."""
         if self.kind == "mesh":
             return float(triangle_areas(self.triangles).sum())
         if self.kind == "rectangle":
@@ -66,7 +66,7 @@ class ReferenceAreaLight:
 
     @property
     def corners(self) -> Array:
-        """Of a rectangle, in order, (4, 3) [m]."""
+        """Corners of a rectangle, in order, (4, 3) [m]."""
         signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
         return self.centre + (signs * self.half) @ self.frame[:2]
 

@@ -20,7 +20,7 @@ _BEYOND = 1e-4  # how far a shape may reach beyond its grid, as a fraction of th
 
 @dataclass(frozen=True)
 class CloudDensity:
-    """What fills a cloud from place to place."""
+    """The varying density of a cloud."""
 
     medium: Any  #: Mitsuba's
     largest: float  #: extinction [1/m]

@@ -60,7 +60,7 @@ class CloudScene:
 
     @property
     def around(self) -> ReferenceMedium:
-        """What surrounds the clouds: vacuum."""
+        """The medium around the clouds: vacuum."""
         return VACUUM
 
 

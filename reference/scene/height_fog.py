@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Height fog, a medium without sides: a `heterogeneous` medium whose extinction is a volume of type `heightfog`.
 
-Mitsuba's plugin answers for its numbers (`validation.scenes.height_fog`). What follows from them each estimator
-derives for itself.
+The plugin (`validation.scenes.height_fog`) gives its numbers. Each estimator derives for itself what follows from them.
 """
 
 from dataclasses import dataclass

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What hides lights, as numbers: triangles of meshes and rectangles, spheres, and disks.
+"""Occluders as numbers: triangles of meshes and rectangles, spheres, and disks.
 
 Mitsuba takes a `sphere` for the sphere around the image of its centre whose radius is the length of the image of its
 first axis, whatever else the transform does to it, and so does this module. Shadows do not depend on the side to which

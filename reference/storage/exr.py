@@ -30,7 +30,7 @@ NOTE = "airlight:read"  #: the attribute in which the reader says what it change
 
 Attribute = str | int | float
 
-# What the format itself keeps in a header.
+# Attributes that the format itself puts into a header.
 # fmt: off
 _STANDARD = frozenset((
     "channels", "chunkCount", "compression", "dataWindow",
@@ -90,14 +90,14 @@ def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -
     image
         The image.
     name
-        Of the layer; the empty name is the total.
+        The name of the layer; the empty name is the total.
     path
-        What messages call the image.
+        The name of the image in messages.
 
     Raises
     ------
     InputError
-        If it is not there, with the layers that are and the nearest name.
+        If the layer is missing, with the layers that exist and the nearest name.
     """
     name = name or TOTAL
     if name in image.layers:
@@ -146,9 +146,9 @@ def read_exr(path: str | os.PathLike[str]) -> Image:
 
     Plain `R`, `G`, `B` (or `r`, `Red` and so on) become the layer `total`, half floats float32, a lone `Y` three equal
     channels; the attribute `airlight:read` says so, and names the channels left out (alpha, integers, incomplete
-    layers). Of a file with several parts, all are read: a channel that names no layer is of the layer that its part is
-    named by. The image is the display window: what a data window has beyond it is cut off, what it lacks is 0, see
-    `Image.window`. A subsampled channel is repeated.
+    layers). All parts of a file are read: a channel that names no layer belongs to the layer with the name of its part.
+    The image is the display window: a data window is cut off beyond it, and missing pixels are 0, see `Image.window`. A
+    subsampled channel is repeated.
 
     Raises
     ------
@@ -380,7 +380,7 @@ def _image(channels: dict[str, NDArray[Any]], header: dict[str, Any], window: Wi
             continue
         layers[name or TOTAL] = np.stack([floats[key] for key in keys], axis=-1)
         used |= set(keys)
-    # Beside an X it is a component of a vector.
+    # With an X it is a component of a vector.
     depth_key = next((key for key in ("depth.Z", "Z") if key in floats and key[:-1] + "X" not in floats), None)
     used |= {depth_key} if depth_key else set()
     if grey:

@@ -9,8 +9,8 @@
 * the versions of Mitsuba, Dr.Jit, NumPy and SciPy.
 
 Source code counts as Python compiles it, without comments, docstrings and line numbers: rewording one throws nothing
-away. What a result took is the time to compute it from nothing: when a result is loaded, the time that it once took is
-added to that of the result which is being computed from it.
+away. The time of a result is the time to compute it from nothing: when a result is loaded, its original time is added
+to the time of the result that is being computed from it.
 
 A value is made of numbers, words, arrays, lists, dictionaries and data classes of these, as its function's annotation
 says. Work that goes on where it was stopped keeps its parts by `store` and `load` under keys inside that of the whole:
@@ -53,7 +53,7 @@ T = TypeVar("T")
 
 
 class Spent(NamedTuple):
-    """What a computation took."""
+    """The times of a computation."""
 
     seconds: float  #: [s]
     processor: float  #: of all threads of the process [s]
@@ -70,7 +70,7 @@ class Kept(Generic[T]):
 
     @property
     def seconds(self) -> float:
-        """What it took [s]."""
+        """Wall-clock time [s]."""
         return round(self.spent.seconds, 3)
 
     @property

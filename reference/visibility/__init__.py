@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which parts of camera rays a light reaches, for `reference.quadrature`: one answer for all lights.
 
-A light is a homogeneous position, a place or a direction; an area light has a sample for each ray. What stands in the
-light is mapped to the ray, exactly, and fresh random shadow rays check the rest.
+A light is a homogeneous position, a place or a direction; an area light has a sample for each ray. Occluders are mapped
+to the ray exactly, and fresh random shadow rays check the lit rest.
 
 Read in this order:
 
 - `line_crossings.py`: where lines enter and leave convex bounds;
 - `exact_distance.py`: the distance to the visible surface in float64;
-- `planes.py`: the plane of a ray and a light, and the map of what stands in it;
+- `planes.py`: the plane of a ray and a light, and the map of occluders to the ray;
 - `candidates.py`: which shapes can stand in the light of which rays;
-- `shadows.py`: what triangles, disks and spheres hide, and the lit rest;
+- `shadows.py`: the shadows of triangles, disks and spheres, and the lit rest;
 - `certificate.py`: random shadow rays, and the judge of what they contradict;
 - `lit_intervals.py`: the lit intervals of rays, found and checked;
-- `before_light.py`: what can stand in the light of an area light.
+- `before_light.py`: the possible occluders of an area light.
 """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can stand in the light of an area light.
+"""The possible occluders of an area light.
 
-A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides itself: so a light's own
-shape never shadows it, nor does what lies in or behind the plane of a rectangle or a disk. It is left out, for in
-float64 what lies in that plane would be in front of it or behind it by chance. Another mesh stays, a hair behind where
+A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides itself: a light's own
+shape therefore never shadows it, nor do shapes in or behind the plane of a rectangle or a disk. They are left out: in
+float64 a shape in the plane would be in front of it or behind it by chance. Another mesh stays, a hair behind where
 its light starts.
 """
 

@@ -41,7 +41,7 @@ _WORTH = 512  # pairs of rays and shapes: to look through fewer costs less than 
 
 @dataclass(frozen=True)
 class Ball:
-    """What holds a light: a ball about a place, or the direction towards it, with w as in `planes`."""
+    """The bounds of a light: a ball about a place, or the direction towards it, with w as in `planes`."""
 
     centre: Array  #: (3,) [m], or a unit vector
     radius: float = 0.0  #: [m]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Evidence that lit intervals are right: fresh random shadow rays, which share no code with them, and one judge.
 
-Mitsuba casts the shadow rays in single precision. Within the rounding of an edge they decide nothing. Elsewhere a
-third route judges a contradiction: a float64 test of that one shadow segment against every triangle (Moeller and
-Trumbore 1997, Fast, minimum storage ray-triangle intersection, J. Graphics Tools 2(1)), sphere and disk. What is left
-then is doubt, and its worth goes into the bound of the image.
+Mitsuba casts the shadow rays in single precision. Within the rounding of an edge they decide nothing. Elsewhere a third
+route judges a contradiction: a float64 test of that one shadow segment against every triangle (Moeller and Trumbore
+1997, Fast, minimum storage ray-triangle intersection, J. Graphics Tools 2(1)), sphere and disk. Segments that remain
+undecided are in doubt, and their largest effect goes into the bound of the image.
 """
 
 import hashlib

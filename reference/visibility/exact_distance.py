@@ -24,7 +24,7 @@ def exact_distance(reference: ReferenceScene, interaction: Any, distance: Array,
     `shapes`: what `read_shapes` returned, if known.
 
     Valid where the plane of the triangle is met within 1e-4 of the distance; elsewhere, on triangles seen edge-on, the
-    distance stays what it was. So it does on spheres that a ray misses in float64, which happens where it touches them.
+    distance stays what it was. It also stays on spheres that a ray misses in float64, which happens at tangents.
     """
     hit = np.isfinite(distance)
     shape_of_hit = np.array(dr.reinterpret_array(mi.UInt32, interaction.shape))

@@ -24,7 +24,7 @@ _END = 1e-6  # of a distance: an interval that ends this close to the surface, m
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What can stand in a light, and near which rays."""
+    """The possible occluders of a light, and the rays that they are near."""
 
     scene: Any  #: an `mi.Scene` of the shapes
     shapes: Shapes

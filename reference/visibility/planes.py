@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The plane of a ray and a light, and the one map that brings all that stands in the light down to the ray.
+r"""The plane of a ray and a light, and the one map that projects all occluders to the ray.
 
 A light is a homogeneous position: a place p with w = 1, or the unit direction p towards it with w = 0. In the plane of
-a ray o + x d and the light let z be the component along d, and y that across it on the light's side; the ray is y = 0.
-The light is at
+a ray o + x d and the light let z be the component along d, and y the component across it on the light's side; the ray
+is y = 0. The light is at
 
     (z_P, y_P) = (foot, height) of a place,      (cos, sin) of the angle between ray and light of a direction.
 
-What stands at (z, y) is on the shadow segment of one point of the ray,
+An occluder at (z, y) is on the shadow segment of one point of the ray,
 
     x = (z y_P - y z_P) / (y_P - w y),      where 0 <= y and w y < y_P,
 
-for a place the point on the ray that it hides, for a direction z - y cos/sin. At y = y_P a place sends light along the
-ray: x goes to infinity, on the side on which it stands. For a direction -cos is the cosine of the angle between the
-light's way and the ray; the scattering angle has the cosine cos.
+which for a direction is z - y cos/sin. At y = y_P a place sends light along the ray: x goes to infinity, on the side on
+which it stands. For a direction -cos is the cosine of the angle between the light's way and the ray; the scattering
+angle has the cosine cos.
 
 With theta, the angle at a light at a place from the foot point, x = z_P + y_P tan(theta). The cosine between an axis of
 the light and the way to the point at theta is
@@ -21,9 +21,9 @@ the light and the way to the point at theta is
     c(theta) = axial sin(theta) + across cos(theta) = m cos(theta - theta_m),
     m = sqrt(axial^2 + across^2),   theta_m = atan2(axial, across),
 
-`axial` and `across` the components of the axis along d and along n, the unit vector from the light to the foot point.
-So a cone of half angle b is one interval, |theta - theta_m| <= acos(cos b / m), nothing if m < cos b: no nappes, no
-cases. (`realtime.rays` solves a quadratic equation in the distance instead.)
+`axial` and `across` the components of the axis along d and along n, the unit vector from the light to the foot point. A
+cone of half angle b is therefore one interval, |theta - theta_m| <= acos(cos b / m), nothing if m < cos b: no nappes,
+no cases. (`realtime.rays` solves a quadratic equation in the distance instead.)
 """
 
 from dataclasses import dataclass, fields

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""What triangles, disks and spheres take from the light of rays, and what is left: compiled loops, a ray in each lane.
+r"""The shadows of triangles, disks and spheres on rays, and the lit rest: compiled loops, a ray in each lane.
 
 In the plane of a ray and its light (`reference.visibility.planes`) a triangle and a disk are segments, a sphere is a
-disk of centre (c_z, c_y) and radius rho. What casts a shadow lies in the strip 0 <= y, w y < y_P, and each part of it
-that is convex hides one interval of the ray, since the map
+disk of centre (c_z, c_y) and radius rho. Occluders lie in the strip 0 <= y, w y < y_P, and each convex part of them
+hides one interval of the ray, since the map
 
     x = (z y_P - y z_P) / (y_P - w y)
 
-takes lines to lines and keeps what is between. No sampling, no rays cast, everything in float64: however thin a shadow,
-it is found.
+takes lines to lines and keeps the order of points. No sampling, no rays cast, everything in float64: however thin a
+shadow, it is found.
 
 **Segments** are clipped to the strip and hide what lies between the images of both ends.
 
@@ -22,7 +22,7 @@ through the light along the ray, and the shadow is unbounded on that side; or at
 itself meets the disk, at c_z +- sqrt(rho^2 - c_y^2). A light inside of a sphere sees what is inside and nothing else,
 and the range in which a ray is looked at is cut to that before (`reference.visibility.lit_intervals`).
 
-**What is left.** Neighbours in a mesh mostly follow one another in its list: a shadow that touches the one before it
+**The lit rest.** Neighbours in a mesh mostly follow one another in its list: a shadow that touches the one before it
 becomes part of it as it is found. Then t begins at the beginning of a ray: shadows that begin before t and end after it
 move t to their end, until none does; the ray is lit from t to where the next shadow begins, and t moves there. The list
 is gone through forwards and backwards in turn, since shadows of a mesh mostly come in one order or the other. Nothing

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SeenClouds:
-    """What the pixel-centre rays meet."""
+    """The clouds and surfaces on the pixel-centre rays."""
 
     transmittance: Array  #: of all clouds up to the visible surface, or to infinity, (pixels, 3)
     distance: Array  #: to the visible surface, infinite where there is none, (pixels,) [m]

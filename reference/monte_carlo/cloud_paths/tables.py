@@ -22,7 +22,7 @@ _BEYOND = 4e-7
 
 @dataclass(frozen=True)
 class WalkScene:
-    """What the walk reads, for one extinction of each medium."""
+    """The scene as the walk reads it, with one extinction for each medium."""
 
     scene: Any  #: the `mi.Scene`
     camera_medium: int  #: number of the medium that it is in

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Light paths from the eye through clouds, in one loop that casts one ray a turn.
 
-A path flies an exponentially distributed optical length through clouds, air costs nothing, is scattered by the phase
-function, and so on until it leaves; what it meets then is the sky. At every place of scattering a shadow ray to a sun
-adds the sun's light: one of the suns at random, by its irradiance.
+A path flies an exponentially distributed optical length through clouds (air has no extinction), is scattered by the
+phase function, and so on until it leaves and meets the sky. At every place of scattering a shadow ray to a sun adds the
+sun's light: one of the suns at random, by its irradiance.
 
 With a directional sun that term holds the phase function p_s of the angle between the path and the sun, whose forward
-peak is rarely met and then great. So directions are sampled a second time, about the sun (multiple importance sampling,
-Veach and Guibas 1995): from each place x a *side flight* leaves in a direction drawn from p_s, has its own free flight,
-and adds the sun's light where that ends. With p_a the phase function about the path, the sun's light at the end of both
-flights counts
+peak is rarely met and then large. Directions are therefore sampled a second time, about the sun (multiple importance
+sampling, Veach and Guibas 1995): from each place x a *side flight* leaves in a direction drawn from p_s, has its own
+free flight, and adds the sun's light where the flight ends. With p_a the phase function about the path, the sun's light
+at the ends of both flights counts
 
-    p_a/(p_a + p_s)                  times what it is after the path's own flight,
+    p_a/(p_a + p_s)                  times its value after the path's own flight,
 
 which is at most 1 times p_s, so that their product stays below p_a: no peak is left. A place before which the path was
 not scattered (the first, and the one after a surface) has no side flight before it, and its light counts whole.
@@ -20,10 +20,10 @@ Paths are never cut short in clouds: absorption is a weight. Where a weight fall
 surfaces, the path goes on with a probability in proportion (Russian roulette, unbiased). A shadow ray that leaves a
 cloud with less than 1/8 of its light likewise goes on with 8 times that fraction as its probability.
 
-In which medium a stretch lies follows from its end: before a face of a cloud seen from inside, the cloud; before one
-seen from outside, or nothing, vacuum; before an opaque surface, where the path was last. So a crossing that rounding
-doubles or hides repairs itself at the next face. After a crossing a ray starts a little further on, which is added to
-the length of its next stretch.
+The end of a stretch tells its medium: before a face of a cloud seen from inside, the cloud; before a face seen from
+outside, or nothing, vacuum; before an opaque surface, the medium where the path was last. A crossing that rounding
+doubles or hides therefore does no harm beyond the next face. After a crossing a ray starts a little further on; this
+gap is added to the length of its next stretch.
 
 A cloud with a density has its largest extinction for `sigma_t`, and the fraction rho of it at each place. Flights go as
 if it had the largest everywhere, and where one ends it is scattered with the probability rho, otherwise it flies on
@@ -73,7 +73,7 @@ class Targets:
 
 @dataclass
 class Paths:
-    """What a lane knows of its path."""
+    """The state of a lane's path."""
 
     mode: Any  #: what its ray is
     o: Any  #: where the ray starts [m]
@@ -215,7 +215,7 @@ def _turn(paths: Paths, sampler, *, scene: WalkScene, targets: Targets, sums, ra
         cloud = dr.select(reflects, medium, cloud)
         shadow_from = dr.select(reflects, si.spawn_ray(to_sun).o, shadow_from)
 
-    # What follows: a shadow ray, a side flight, the path itself, or the next path.
+    # The next ray: a shadow ray, a side flight, the path itself, or the next path.
     begins_shadow = (scatters | reflects) & scene.has_suns
     reflected = (dark & (mode == SURFACE_SHADOW)) if scene.has_suns else reflects
     main_done = (dark & (mode == SHADOW)) if scene.has_suns else begins

@@ -2,11 +2,11 @@
 r"""Sampling points on area lights, in Dr.Jit: evenly over the area, and towards the ray.
 
 For one point y of a light, the distances along a camera ray come from
-`reference.monte_carlo.single_scatter.distance_sampling`, as for a lamp at y. What such a sample is worth is bounded by
-range/h, h the distance of y from the ray. Were y spread evenly over the area, the mean square of that would be the
-integral of 1/h^2 over the area, which has no end where a ray meets the light. So half of the points are spread about
-the place c where the ray meets the light, or comes nearest to it, with a density that goes as 1/rho, rho = \|y - c\|:
-the mean square is then the integral of 1/rho over the area, which is finite.
+`reference.monte_carlo.single_scatter.distance_sampling`, as for a lamp at y. The value of such a sample is bounded by
+range/h, h the distance of y from the ray. If y were uniform over the area, the mean square of the value would be the
+integral of 1/h^2 over the area, which diverges where a ray meets the light. Half of the points are therefore spread
+about the place c where the ray meets the light, or comes nearest to it, with a density that goes as 1/rho, rho = \|y -
+c\|: the mean square is then the integral of 1/rho over the area, which is finite.
 
 In the plane of a rectangle or disk, seen from c, with R(phi) how far the light reaches in the direction phi:
 
@@ -246,11 +246,11 @@ def _on_plane(u, v, light: AreaLight, origin, direction) -> LightSample:
     distance = _edge(x0, y0, cosine, sine, light) * (v / fraction)
     x, y = dr.select(about, x0 + distance * cosine, x), dr.select(about, y0 + distance * sine, y)
     rho = dr.hypot(x - x0, y - y0)
-    # From a place on the edge the light does not reach outwards at all: what is drawn there is the place itself.
+    # At a place on the edge the light has no extent outwards: the sample drawn there is the place itself.
     counts = rho > _TOUCHING * max(a, b)
     rho = dr.select(counts, rho, 1)
     edge = _edge(x0, y0, (x - x0) / rho, (y - y0) / rho, light)
-    # What rounding puts a little beyond the edge is at the edge.
+    # A point that rounding puts a little beyond the edge is at the edge.
     density = (1 - fraction) / light.area + fraction / (2 * math.pi * dr.maximum(edge, rho) * rho)
     density = dr.select(counts, density, 0)
     return LightSample(light.centre + light.across * x + light.up * y, light.normal, density)

@@ -27,7 +27,7 @@ _BEYOND = 2e-6  # of the largest coordinate: how far beyond a boundary a ray goe
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What rays can meet."""
+    """The shapes that rays can meet."""
 
     scene: Any  #: the `mi.Scene`
     surfaces: bool  #: there are shapes

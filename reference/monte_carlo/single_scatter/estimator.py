@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""What one scattering sends along camera rays: the estimator of the integrator `single-scatter`, in Dr.Jit.
+r"""Light scattered once into camera rays: the estimator of the integrator `single-scatter`, in Dr.Jit.
 
 For each light and each medium that a ray crosses, from x0 to x1,
 
     L = int_{x0}^{x1} T(0, x) sigma_s p(cos)/(4 pi) E V T(x, light) dx
 
-(T transmittance, V visibility) is estimated at distances that the medium draws. E is what a light sends to the point,
-I/r^2 of a light at a place, the irradiance of one from infinity. Area lights and a sky are integrals over their
-points and directions: each sample has one of its own, from a Kronecker sequence with a random start. A surface at the
-end of the ray adds f cos E V T T, where the light needs it the mean over samples. The lights are those of
-`reference.monte_carlo.single_scatter.sources`, transmittances the answers of the medium
-(`reference.monte_carlo.single_scatter.stretches.Part`), phase function, scattering and material f those of Mitsuba's
-own plugins, and only they.
+(T transmittance, V visibility) is estimated at distances that the medium draws. E is the irradiance of a light at the
+point, I/r^2 for a light at a place. Area lights and a sky are integrals over their points and directions: each sample
+has its own, from a Kronecker sequence with a random start. A surface at the end of the ray adds f cos E V T T, for such
+lights as the mean over samples. Lights come from `reference.monte_carlo.single_scatter.sources`, transmittances from
+the medium (`reference.monte_carlo.single_scatter.stretches.Part`); phase function, scattering and material f come from
+Mitsuba's plugins alone.
 
 In a scene whose extinction depends on the channel all channels use the same distances, with the density of the mixture
 over the channels, so that no channel's variance can become infinite.

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`single-scatter`: batches of an estimator of exactly one scattering, in the medium or on a surface.
 
-What is estimated along a ray, and how, is in
-`reference.monte_carlo.single_scatter.estimator`. It is the check of `reference.quadrature`. The two share the rays
-through the pixel centres, which `reference.scene` reads as facts of the scene, and Mitsuba's ray casting; no derivation
-beyond the integral itself (`tests/test_independence.py` follows the imports to their end).
+`reference.monte_carlo.single_scatter.estimator` has the integral along a ray and its estimate. The integrator checks
+`reference.quadrature`. The two share the rays through the pixel centres, which `reference.scene` reads as facts of the
+scene, and Mitsuba's ray casting; no derivation beyond the integral itself (`tests/test_independence.py` follows the
+imports to their end).
 
 The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the grid of cells is
 itself at a random place, a new one for each light and medium. The estimate is unbiased, its error falls as n^-1.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the integrator `single-scatter` must know of a scene: where lights are, what bounds media, what it refuses.
+"""A scene for the integrator `single-scatter`: its lights, the bounds of its media, and the features that are refused.
 
 `reference.scene.read` reads the same scene for the quadrature; the two share no code. Here the emitters, phase
 functions and media stay Mitsuba's own and are asked for their answers while rays are traced.
@@ -25,7 +25,7 @@ from reference.monte_carlo.single_scatter.sources import FarSource, Source, is_s
 
 @dataclass(frozen=True)
 class Task:
-    """What is fixed while a scene is traced."""
+    """The constants of a scene while it is traced."""
 
     around: Surroundings  #: what rays can meet
     sources: tuple[Source, ...]  #: the lights

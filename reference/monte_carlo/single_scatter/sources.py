@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Lights as the estimator asks them: what one sample on a camera ray, or one on a surface, receives.
+r"""Lights for the estimator: the light that one sample on a camera ray, or on a surface, receives.
 
-A light at a place sends the intensity I to a point at the distance r; a sample receives I/(r^2 density), the density
-that of the distances along the ray (`reference.monte_carlo.single_scatter.stretches.Part`). An area light has a
-point y of its own for each sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w
-the unit vector from y. Its plane clips the ray: what lies behind it gets no light from there. A sun and a sky have an
-irradiance, a sky a direction of its own for each sample. What a light sends where is the answer of Mitsuba's emitter,
-but for area lights, which are read again (`reference.monte_carlo.single_scatter.area_sampling`): nothing asks
-Mitsuba's `sample_direction` for these.
+A light at a place sends the intensity I to a point at the distance r; a sample receives I/(r^2 density), with the
+density of the distances along the ray (`reference.monte_carlo.single_scatter.stretches.Part`). An area light has a
+point y for each sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w the unit
+vector from y. The plane of y clips the ray: points behind it get no light from y. A sun and a sky have an irradiance,
+and a sky has a direction for each sample. Mitsuba's emitters compute the emission, except for area lights, which are
+read again (`reference.monte_carlo.single_scatter.area_sampling`): Mitsuba's `sample_direction` is not used for these.
 """
 
 import math

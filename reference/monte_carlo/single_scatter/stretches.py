@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Camera rays, their parts in media, ways from lights to points on them, and cells of samples.
 
-What a medium must say of its part of the rays is `Part`. A new medium is one more of these, in a file of its own.
+`Part` is the interface of a medium on its part of the rays. A new medium is another `Part`, in its own file.
 """
 
 from abc import ABC, abstractmethod

@@ -95,8 +95,8 @@ def flights(slab: Slab, photons: int, random: np.random.Generator) -> Iterator[t
     Yields
     ------
     weight, place, direction
-        What absorption has left; x, y and the depth z of the photons, and the components of their directions, the third
-        downwards, (photons,) each.
+        The fraction left by absorption; x, y and the depth z of the photons, and the components of their directions,
+        the third downwards, (photons,) each.
     """
     place = np.zeros(photons), np.zeros(photons), np.zeros(photons)
     sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))
