@@ -25,14 +25,14 @@ _FORGET = "5"  # what makes Linux forget the peak so far
 
 
 class Took(NamedTuple):
-    """What work took."""
+    """The times of work."""
 
     ms: float  #: by the wall clock [ms]
     cpu_ms: float  #: of the processors, of all threads [ms]
 
 
 class Run(NamedTuple):
-    """What work gave, and what it took."""
+    """The result of work, and its times."""
 
     value: Any
     ms: float  #: by the wall clock [ms]
@@ -98,8 +98,8 @@ def timing_of(milliseconds: Iterable[float], *, cpu_ms: float | None = None) -> 
 def peak_memory(work: Callable[[], Any]) -> float | None:
     """Return how much more memory the process holds at the peak of `work` than before it [MiB].
 
-    What it frees before it ends counts, what was freed before it began does not. None where the system does not say:
-    only Linux lets a process forget an earlier peak.
+    Memory that `work` frees before it ends counts; memory that was freed before does not. None where the system does
+    not say: only Linux lets a process forget an earlier peak.
     """
     dr.sync_thread()
     gc.collect()

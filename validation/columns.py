@@ -24,7 +24,7 @@ _KINDS = {str: "string", int: "int64", float: "float64", bool: "bool", bytes: "b
 
 @dataclass(frozen=True)
 class Column:
-    """What the values of a column are."""
+    """The description of a column."""
 
     key: str  #: the path of the value in the record, with dots
     heading: str

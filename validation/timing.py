@@ -67,7 +67,7 @@ class FrameTimes:
 
 @dataclass(frozen=True)
 class StepCost:
-    """What a frame takes at one step of growing work."""
+    """The times of a frame at one step of growing work."""
 
     work: float
     frame: Timing
@@ -90,7 +90,7 @@ class TimeGrowth:
 
 @dataclass(frozen=True, kw_only=True)
 class Scaling:
-    """What a method costs as one kind of work grows."""
+    """The cost of a method as one kind of work grows."""
 
     scene: str = column(meaning="of the study")
     size: tuple[int, int] = column(unit="pixels", meaning="of its images")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What engines do to values before they write them: encodings and tone curves. Values below 0 stay, or become 0."""
+"""Encodings and tone curves that engines apply before they write values. Values below 0 stay, or become 0."""
 
 from collections.abc import Callable, Mapping
 

@@ -74,13 +74,13 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What is wrong with a layer of an image."""
+    """The faults of a layer of an image."""
 
     scene: str
     path: str
     layer: str
     pixel: str  #: 'centre' or 'area'
-    first: str  #: name of what comes first; 'right' or 'unexplained' where no fault does
+    first: str  #: name of the first explanation; 'right' or 'unexplained' where it is no fault
     ranked: tuple[Ranked, ...]
     residual: float  #: mean relative error of the image as it is
     left: float  #: what the first explanation leaves of it
@@ -103,7 +103,7 @@ class Diagnosis:
 
     @property
     def lines(self) -> list[str]:
-        """What comes first, what is left, and what else was thought of."""
+        """The first explanation, the error that it leaves, and the others that were tried."""
         pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
         off = f"values are {_percent(self.residual)} off in the mean"
         lines = [f"{self.path}, {self.layer}, against {self.scene}, {pixel}: {off}."]
@@ -287,9 +287,9 @@ class _Attempt:
         if len(explanation.faults) > 1:
             return leaves_nothing(explanation, self.pixel)
         if explanation.faults and not self.predictor.reference.area:
-            # What is little for an image may be much beside what the fault itself does, if it is not the right one:
-            # a factor leaves 0.4 % of what a lamp of 0.25 m does, all of it in the shadows, and another g 0.2 % of a
-            # near plane at 0.1 m, most of it in the middle.
+            # An error that is small for an image may be large next to the effect of the fault, if it is the wrong
+            # fault: # a factor leaves 0.4 % where a lamp has 0.25 m, all of it in the shadows, and another g leaves 0.2
+            # % where # the near plane is at 0.1 m, most of it in the middle.
             return leaves_nothing(explanation, "centre") or is_noise(explanation, pairs)
         return usual_error(explanation) <= self.little or is_noise(explanation, pairs)
 
@@ -324,7 +324,8 @@ class _Attempt:
             return self.right
         scale = min(scale_of(each, self.pixel) for each in [self.right, *explanations])
         most = max(evidence(each, self.right, scale) for each in explanations)
-        # Of those that explain it alike, such as a factor and a near plane before dark fog, the simplest and the first.
+        # Among equally good explanations, such as a factor and a near plane before dark fog: the simplest, then the
+        # first.
         alike = [each for each in explanations if evidence(each, self.right, scale) >= most - _ALIKE]
         best = min(alike, key=lambda each: each.parameters)
         return best if is_enough(best, self.right, scale, self.predictor.pairs) else self.right
@@ -332,8 +333,8 @@ class _Attempt:
     def _try_pairs(self, chosen: Explanation) -> list[Explanation]:
         """Return explanations by two faults of different kinds.
 
-        Pairs of any with one of those that leave least begin where their faults do; those that leave least there are
-        followed until one leaves nothing that could be seen.
+        Each pair has one of the faults that leave least, and starts from the values found for its faults alone; the
+        best pairs are followed until one leaves nothing visible.
         """
         ordered = sorted(self.singles, key=lambda each: each.error)
         cheap = [each.faults[0] for each in ordered if not each.faults[0].costly and not each.faults[0].single]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a fault of an image is, how faults change what is guessed of it, and what a scene must have for them.
+"""Faults of an image, how they change a guess of it, and the features that a scene needs for them.
 
-A fault changes a guess, which may be that of another one: two faults of different kinds are one after the other. It has
-no parameter, or some, each with a range and values to begin with.
+A fault changes a guess, which another fault may have changed before: two faults of different kinds are applied in turn.
+A fault has any number of parameters, each with a range and values to begin with.
 """
 
 import math

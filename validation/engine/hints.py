@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What may be wrong with an image as a whole: a constant factor, another way up, a gamma, values that stop at one.
+"""Suspected faults of a whole image: a constant factor, another way up, a gamma, values that stop at one.
 
 Such a fault of set-up hides everything else. For each combination of suspects this module takes the faults back,
-computes the root mean square error again, and names those that make it ten times smaller, the fewest first.
+computes the root mean square error again, and names the combinations that make it ten times smaller, the fewest first.
 
-The radiance grows without bound towards a lamp, so that one pixel beside it can have most of the error, whatever the
-others are like. Therefore the error that decides leaves out a hundredth of the values that are lit, the worst; and the
+The radiance grows without bound towards a lamp, so that one pixel next to it can have most of the error, whatever the
+others are like. The error that decides therefore leaves out the worst hundredth of the lit values; and the
 factor that fits best is k = exp(median(log(r/t))) over the values that both images light, with t the test image and r
 the reference.
 """
@@ -39,7 +39,7 @@ _UNDONE = [
 
 @dataclass(frozen=True)
 class Hints:
-    """What may be wrong with an image as a whole."""
+    """The suspected faults of a whole image."""
 
     factor: float  #: times which the image fits the reference best; NaN if there is none
     factor_rmse: float  #: the relative rmse that is left then

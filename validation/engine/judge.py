@@ -122,7 +122,7 @@ class EngineComparison:
 
     @property
     def pixel(self) -> str:
-        """What a pixel of the reference is: its 'centre' or its 'area'."""
+        """Where a pixel of the reference is taken: at its 'centre' or over its 'area'."""
         return self.kind.pixel
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an engine with a fault would show, pixel by pixel: the fog model of a changed scene, then changed values."""
+"""The image of an engine with a fault, pixel by pixel: the fog model of a changed scene, then changed values."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -33,7 +33,7 @@ _BLACK = 1e-7  # of the mean that the scene itself would have: below it an image
 
 @dataclass(frozen=True)
 class Scenery:
-    """What of a scene decides the paths of light; each combination has paths of its own."""
+    """The properties of a scene that decide the paths of light; each combination has its own paths."""
 
     shadows: bool = True
     offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
@@ -46,7 +46,7 @@ class Scenery:
 
     @property
     def where(self) -> dict[str, Any]:
-        """What decides the rays."""
+        """The properties that decide the rays."""
         return {"offset": self.offset, "zoom": self.zoom}
 
     def lights(self, reference: ReferenceScene) -> tuple[ReferenceLight, ...]:
@@ -80,7 +80,7 @@ class Scenery:
 
 @dataclass(frozen=True)
 class Guess:
-    """What an image could be: a scene, what fills it, and what was done to the values."""
+    """A guess of an image: a scene, its fog, and the changes of the values."""
 
     fog: Fog
     scenery: Scenery = field(default_factory=Scenery)

@@ -66,10 +66,11 @@ def explain(
     """Return the best explanation by some faults together.
 
     `faults`: in the order in which they change the guess; `near`: values to begin with; by default all starts of the
-    faults are tried; `fine`: whether the values are looked for to all digits, or to some per cent, which a fault that
-    is wrong needs.
+    faults are tried; `fine`: whether the values are found to all digits, or to some per cent, which is enough for a
+    wrong fault.
     """
-    # Of what moves paths, which are found again for each value, few come first; to tell faults apart they are enough.
+    # Faults that move paths, which are found again for each value, are tried on few pixels first: enough to tell faults
+    # apart.
     moves = any(parameter.step for fault in faults for parameter in fault.parameters)
     sought = [predictor.coarse if moves else predictor, *[predictor] * fine]
     searches = [_Search(each, tuple(faults)) for each in sought]

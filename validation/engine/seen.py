@@ -173,7 +173,7 @@ def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class PixelKind:
-    """What the pixels of an image are."""
+    """Whether the pixels of an image are centres or areas."""
 
     pixel: str  #: 'centre' or 'area'
     errors: Mapping[str, float] = field(default_factory=dict)  #: mean relative ones by kind, if several were compared

@@ -62,12 +62,12 @@ def agreement(
 ) -> dict[str, Agreement]:
     """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
 
-    It runs until the half width of every interval is below 0.4 times the margin: a rule that looks at the spread
-    alone, so that stopping favours no verdict. Nor does the end of its time.
+    It runs until the half width of every interval is below 0.4 times the margin. This rule looks at the spread
+    alone, so that stopping favours no verdict; nor does the end of the time.
 
     The `mi.Scene` may be small, since all pixels are pooled. The estimator, 'volpath' or 'single-scatter', agrees if
-    the 95 % interval of the relative bias lies inside +- `margin`. So many `batches` are traced at most, of `samples` a
-    pixel each; those of volpath go where its pilot spread most (`reference.monte_carlo.allocation`). After so many
+    the 95 % interval of the relative bias lies inside +- `margin`. At most `batches` are traced, of `samples` a
+    pixel each; volpath places its samples where its pilot spread most (`reference.monte_carlo.allocation`). After
     `seconds`, the pilot not counted, no further batch is traced; `spread` lets other processes trace some. The result
     is by layer, without the surface where nothing lit is visible.
     """

@@ -169,7 +169,7 @@ def cloud_orders(words: str) -> tuple[str, ...]:
 
 
 class _Watch:
-    """What a run knows of its own progress: the time that it took, and how its error fell."""
+    """The progress of a run: the time that it took, and how its error fell."""
 
     def __init__(self, budget: Budget, near: NDArray[np.bool_], progress: Progress | None) -> None:
         self._budget, self._near, self._progress = budget, near, progress

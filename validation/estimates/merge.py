@@ -3,8 +3,8 @@ r"""References of several machines as one.
 
 A file holds for each value the mean m of its K batches and their standard error s, so the sum of squared deviations is
 K (K - 1) s^2, and files add up as batches do: the spread within each and that between their means
-(`reference.monte_carlo.batches.combined_moments`). What merging loses is the rounding of files to single precision:
-the mean keeps a relative 2^-24 = 6e-8 or so, the standard error likewise. The spread between two means that differ by
+(`reference.monte_carlo.batches.combined_moments`). Merging loses only the rounding of files to single precision: the
+mean keeps a relative 2^-24 = 6e-8 or so, the standard error likewise. The spread between two means that differ by
 rounding alone shows as a relative standard error of the order of 6e-8, where the estimator has no noise at all.
 """
 

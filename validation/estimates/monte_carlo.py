@@ -2,10 +2,10 @@
 """Batches of a Monte Carlo estimator, from the cache where they were traced before.
 
 Every batch is kept as soon as it is finished, so a run that was interrupted or killed goes on from there. Eight batches
-whose seeds begin at a multiple of eight are kept as one block, which takes a quarter of the room. What a run returns
-depends on its seeds and their number alone, never on what was in the cache: blocks and the batches in them are always
-added up in the same order, and a run of fewer batches than are kept gets those alone (up to seven that are only kept
-within a block are traced again).
+whose seeds begin at a multiple of eight are kept as one block, which takes a quarter of the room. The result of a run
+depends on its seeds and their number alone, never on the cache: blocks and the batches in them are always added up in
+the same order, and a run of fewer batches than are kept uses those alone (up to seven that are only kept within a block
+are traced again).
 """
 
 import errno
@@ -42,7 +42,7 @@ BLOCK = 8  #: batches in a block
 
 @dataclass(frozen=True)
 class Run:
-    """What a run came to."""
+    """The result of a run."""
 
     batches: Batches
     cached: int  #: batches that were in the cache

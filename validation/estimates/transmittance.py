@@ -15,7 +15,7 @@ of every step, which gives the unbiased estimate X = (l/n) sum sigma_t of tau.
   with the elementary symmetric means m_k, cut at a random order N by roulette: order 0 in nine of ten cases, else
   2 at least, and from there on k with the probability 2/k (their aggressive Bhanot-Kennedy roulette); term k is divided
   by the probability to get there. The mean over all pivots is taken. Without their affine control variate.
-- **jackknife** (Peters 2025): exp(-(X_1 + X_2)/2) cos((X_1 - X_2)/2). Of normal X it is the unbiased estimate of least
+- **jackknife** (Peters 2025): exp(-(X_1 + X_2)/2) cos((X_1 - X_2)/2). For normal X it is the unbiased estimate of least
   variance: E exp(-mean) = T exp(v/4), and the cosine, independent of the mean, is exp(-v/4) on average.
 """
 

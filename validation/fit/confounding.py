@@ -3,8 +3,9 @@
 
 Where a combination of steps changes no pixel, the derivatives are linearly dependent: albedo against intensity in the
 airlight, always; exposure against the intensity of the only light. Singular vectors of the derivatives, each column
-divided by its length, say which: those with a singular value below a millionth of the largest. Of the parameters in
-them all but as many as can be known are held, the later ones of the list, and the others mean products with them.
+divided by its length, identify the combinations: those with a singular value below a millionth of the largest. As many
+of their parameters as can be known stay free; the later ones of the list are held, and the free ones stand for products
+with them.
 """
 
 import math
@@ -78,7 +79,7 @@ def _group(columns: Array, length: Array, null: Array, members: Sequence[int]) -
 
 @dataclass(frozen=True)
 class Product:
-    """What an image says of parameters that it does not tell apart: a product of powers of them."""
+    """A product of powers of parameters that an image does not tell apart."""
 
     name: str  #: such as 'albedo * intensity'
     value: float

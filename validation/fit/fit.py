@@ -70,7 +70,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Fit:
-    """What explains an image of a scene."""
+    """The parameters of a scene that explain an image."""
 
     scene: str
     path: str

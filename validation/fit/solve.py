@@ -3,18 +3,18 @@
 
 1. Starts are tried over three decades of extinction and the whole range of g, each with the factor on the image that
    fits best, by a loss of relative errors that no single pixel decides (Cauchy's).
-2. From the best of them the same loss is minimised, on few pixels first.
-3. What is left says how noisy the image is: least squares with the weights 1/sigma^2, without outliers, until neither
-   changes. Weights that depend on the model, not on the values, stay unbiased even if the noise is skewed.
+2. From the best of them the same loss is minimised, on few pixels first. 3. The residuals tell the noise of the image:
+least squares with the weights 1/sigma^2, without outliers, until neither changes. Weights that depend on the model, not
+on the values, stay unbiased even if the noise is skewed.
 
-Noise of renderers has a part that is the same everywhere and one that grows with the radiance f, so
+Noise of renderers has a constant part and a part that grows with the radiance f, so
 
     sigma^2 = a^2 + b^2 f^2,    a, b >= 0,
 
 is fitted to the scatter of the residuals in groups of like radiance. The scatter of a group is 1.4826 times the median
 of |residual|, the standard deviation of a normal distribution, which pixels that are wrong by any amount do not move as
-long as they are less than half. Values that are off by more than six sigma are outliers: of a million normal ones none
-is. They are left out, and so is all of their pixel.
+long as they are less than half. Values that are off by more than six sigma are outliers, which not one of a million
+normal values is. They are left out, with all of their pixel.
 
 The covariance is the sandwich
 
@@ -24,7 +24,7 @@ which is right for noise that differs from pixel to pixel and is shared by the c
 independent (White 1980, Econometrica 48, 817; its form for clusters by Liang and Zeger 1986, Biometrika 73, 13).
 
 An ellipse of the covariance is right where the image is linear in the parameters. With 20 % of noise an extinction may
-be known to a factor of two, and the intervals of that ellipse held the value in 83 to 89 % of cases. The profile of the
+be known to a factor of two, and the intervals of the ellipse held the value in 83 to 89 % of cases. The profile of the
 sum of squares Q depends on no choice of parameters: with Q_k(t) the least one with parameter k held at t, and at its
 least Q,
 
@@ -182,7 +182,7 @@ def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float,
     sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind.startswith("sigma")]
     gs = [n for n, unknown in enumerate(unknowns) if unknown.kind == "phase.g"]
     factors = [n for n, unknown in enumerate(unknowns) if unknown.kind in _FACTORS]
-    # Of several that multiply the same, such as albedo and exposure, only the first kind takes the factor.
+    # If several parameters multiply the same, such as albedo and exposure, only the first kind takes the factor.
     chosen = [n for n in factors if unknowns[n].kind == unknowns[factors[0]].kind]
     trials = []
     grey = given.copy()

@@ -41,8 +41,8 @@ _PARTS = {"sigma": "sigma_t", "z": "base", "H": "scale_height"}  # of a layer of
 
 Path = tuple[str | int, ...]  #: of a number in a fog: fields, and numbers in tuples
 
-# Of the start of a search: a factor of 22 000, or an artanh g of 10. An image that asks for more says nothing, and a
-# step that is not bounded may ask for a factor that no number holds.
+# Farthest distance from the start of a search: a factor of 22 000, or an artanh g of 10. An image that needs more tells
+# # nothing, and an unbounded step may overflow.
 _FARTHEST = 10.0
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What describes the fog of a scene and how its laws are read, and the radiance of every pixel.
+"""The fog of a scene with the laws as they are read, and the radiance of every pixel.
 
 With the lengths c_k to the camera and l_k to the light in the medium k, a node in the medium m adds
 
     albedo_m sigma_m I p_m(cos) / (4 pi)  weight / r^2  exp(-sum_k sigma_k (a c_k + b l_k)),
 
-a and b the fractions of the extinction that attenuate either segment, 1 by right. A surface point adds its radiance
-times the same exponential. Visibility is held. Where a light is moved by d from where the paths begin, a node at r v
+a and b the fractions of the extinction that attenuate either segment, 1 if correct. A surface point adds its radiance
+times the same exponential. Visibility is fixed. Where a light is moved by d from where the paths begin, a node at r v
 from it (v of unit length, w along the ray) has
 
     r' = |r v - d|,    cos = -(r v - d) . w / r',

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rays of some pixels, what lights reach on them, and from both all single-scattering paths of a scene.
+"""The rays of some pixels, their lit intervals, and from both all single-scattering paths of a scene.
 
-What a light reaches depends on where it is and how wide its cone is, not on its fall-off, on the fog or on the values:
-a view finds it once.
+The lit intervals depend on the place of a light and the width of its cone, not on its fall-off, the fog or the values:
+a view finds them once.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What kernels cost and how wrong they are: nanoseconds a ray beside the error, all kernels and sizes in one run.
+"""The cost and error of kernels: nanoseconds a ray with the error, all kernels and sizes in one run.
 
 Times are of frozen functions after warm-up, on rays that lie ready on the device: from Dr.Jit's kernel history (the
 kernel alone) and from the wall clock (launch and replay included). Errors are of float32 on the set W of
@@ -57,7 +57,7 @@ def bench_kernels(
 ) -> list[KernelCost]:
     """Measure kernels, all of the registry by default: 'name' stands for all its sizes, 'name-N' for one.
 
-    Of the phase functions, with their g, the first is measured with all sizes, the others with the default sizes.
+    The first of the phase functions, given with their g, is measured with all sizes, the others with the default sizes.
     """
     ladders = [_ladder(name) for name in names or KERNELS]
     total = len(ladders) * len(phases)

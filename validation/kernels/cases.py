@@ -38,7 +38,7 @@ TINY = {"single": 1e-37, "double": 1e-300}
 
 @dataclass(frozen=True)
 class Values:
-    """What a kernel gave for cases: NaN in the rows of phase functions that it refuses."""
+    """The values of a kernel for cases: NaN in the rows of phase functions that it refuses."""
 
     J: Array  #: (n,) [1/m]
     refused: dict[str, str]  #: phase function -> the kernel's words

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Relative errors of kernels on rays with a known J: quantiles, what is not finite or negative, the worst ray.
+r"""Relative errors of kernels on rays with a known J: quantiles, values that are not finite or negative, the worst ray.
 
-A value may lose some near the smallest numbers of a precision and still be right. Many processors, and all GPUs, put 0
-for a product below the smallest normal number t (2^-126 in float32, 2^-1022 in float64): they flush. Others round it
-with the few digits that are left. In either case a product is wrong by at most t, beside its relative rounding. Where
-that happens is a matter of units and factors, so that a value far above t can hang on it: a light 2e5 m away, 60
+A value may lose accuracy near the smallest numbers of a precision and still be right. Many processors, and all GPUs,
+put 0 for a product below the smallest normal number t (2^-126 in float32, 2^-1022 in float64): they flush. Others round
+it with the few digits that are left. In either case a product is wrong by at most t, besides its relative rounding.
+Units and factors decide where this happens, so that a value far above t can depend on it: a light 2e5 m away, 60
 optical depths, J = 1.2e-33 1/m over 3e4 m is a sum of terms of 1e-38 1/m^2 each.
 
 A rule with n nodes adds up terms w_k f_k, the fractions w_k adding up to 1, over a length L:
@@ -15,7 +15,7 @@ A rule with n nodes adds up terms w_k f_k, the fractions w_k adding up to 1, ove
 * A product w_k f_k is smaller than its factors, so it is the one that is flushed: by at most t, and J by n t L.
 * J itself is wrong by at most t.
 
-So a value is right, on every processor, where
+A value is therefore right, on every processor, where
 
     |J - J_true| <= bar J_true + a,        a = t (n L + V + 1),
 

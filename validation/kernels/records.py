@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What studies of kernels say, as rows and reports hold it, without Dr.Jit; what is not known is None."""
+"""Results of studies of kernels, for rows and reports, without Dr.Jit; unknown values are None."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -71,7 +71,7 @@ class RayTime:
 
 @dataclass(frozen=True, kw_only=True)
 class KernelCost:
-    """What a kernel of one size costs in one phase function, and how wrong it is in float32."""
+    """The cost of a kernel of one size for one phase function, and its error in float32."""
 
     kernel: str
     family: str
@@ -89,7 +89,7 @@ class KernelCost:
 
     @property
     def time(self) -> RayTime | None:
-        """What kernels are compared by: the device's time where it is known."""
+        """The time by which kernels are compared: the device's where it is known."""
         return self.device or self.wall
 
 

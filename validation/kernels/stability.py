@@ -3,7 +3,7 @@
 
 The certified values are the files of `validation.certified`.
 
-A light volume and shadow planes add and subtract Gamma(x) = J(0, x). Of a sliver far from the light two nearly equal
+A light volume and shadow planes add and subtract Gamma(x) = J(0, x). For a sliver far from the light two nearly equal
 numbers are subtracted, and with relative rounding errors of size eps the difference J(0, x1) - J(0, x0) is wrong by
 about eps (J(0, x0) + J(0, x1)), however exact the kernel: `gamma_difference` compares both.
 """
@@ -27,11 +27,11 @@ Progress = Callable[[int, int, str], None]
 CERTIFIED = ("airlight_integral.csv", "airlight_integral_rays.csv")
 GENERATED = "generated"
 PRECISIONS = ("single", "double")
-#: What an exact kernel keeps: the maxima on every set of rays, the quantiles on the certified ones.
+#: Limits that an exact kernel keeps: the maxima on every set of rays, the quantiles on the certified ones.
 #:
-#: Tables are left out, whose kinks no rule of fixed cost resolves, but not where values are NaN, infinite or negative.
-#: The quantiles describe the certified cases; how many generated rays are hard is a matter of taste. What a processor
-#: flushes to zero on the way is no error: `validation.kernels.errors` derives how much that can be.
+#: Tables, whose kinks no rule of fixed cost resolves, are left out, but not values that are NaN, infinite or negative.
+#: The quantiles describe the certified cases; how many generated rays are hard is a matter of taste. Products that a
+#: processor flushes to zero are no error: `validation.kernels.errors` derives how much they can be.
 BAR = {
     "single_max": 3e-5,  # in float32, for |g| <= 0.9
     "single_max_sharp": 1e-4,  # in float32, for |g| up to 0.95
@@ -86,7 +86,7 @@ def gamma_difference(function: Kernel, cases: Cases, precision: str) -> GammaDif
     start = np.zeros(len(cases.x0))
     far = evaluate_cases(replace(cases, x0=start), function, precision)
     near = evaluate_cases(replace(cases, x0=start, x1=cases.x0), function, precision)
-    # What a frame buffer of this precision would hold.
+    # The values of a frame buffer of this precision.
     dtype = np.float32 if precision == "single" else np.float64
     with np.errstate(over="ignore", invalid="ignore"):
         J = (far.J.astype(dtype) - near.J.astype(dtype)).astype(np.float64)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""How different two images look: CIEDE2000 and Delta E ITP, at a stated exposure and luminance.
 
-Radiance has no colour until it is shown. So each image goes through the same chain, as linear RGB with the primaries
-and the white of sRGB:
+Radiance has no colour until it is shown. Each image therefore goes through the same chain, as linear RGB with the
+primaries and the white of sRGB:
 
     shown = radiance 2^exposure                       1 is white
     CIEDE2000:   clip to [0, 1] -> CIE XYZ -> CIE L*a*b* (D65, its white) -> Delta E_00
     Delta E ITP: times the luminance of white [cd/m^2], clip to [0, peak] -> BT.2020 -> IC_TC_P (PQ) -> Delta E_ITP
 
-and the differences of two pixels follow from the last line of each. The clipping is what a screen does: CIEDE2000 was
-fitted to surface colours and knows nothing brighter than white, and PQ nothing negative. It is not silent: pixels that
-it changed in either image are counted. A difference of 1 is about what a keen eye just sees, in both formulae.
+and the differences of two pixels follow from the last line of each. The clipping imitates a screen: CIEDE2000 was
+fitted to surface colours and is not defined above white, nor PQ below 0. It is not silent: pixels that it changed in
+either image are counted. A difference of 1 is about what a keen eye just sees, in both formulae.
 
 The exposure is in stops. By default it brings the 99th percentile of the reference to 0.9, as the pictures of a report
 do; it depends on the reference alone, so that all tests against one reference are judged at one exposure.

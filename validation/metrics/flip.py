@@ -95,7 +95,7 @@ def flip_hdr(
     if not np.isfinite(scaled_test).all():
         return Flip(None, "the test image is brighter than the reference by more than float32 holds"), None
     start, stop = exposure_range(scaled_reference[chosen])
-    # Of a single exposure it returns 0.
+    # For a single exposure it returns 0.
     count = max(2, int(np.ceil(stop - start)))
     inputs = {"start": start, "stop": stop, "count": count, "ppd": PIXELS_PER_DEGREE}
     answer = _in_child(inputs | {"reference": scaled_reference, "test": scaled_test})

@@ -20,12 +20,12 @@ t the test, d = t - r, and means over all values (pixels times channels):
     dark_max       max of abs(d) where r < f, over mean(r)       ours
 
 **The epsilons have a unit.** 0.01 is a radiance: airlight of 0.001 W/(m^2 sr) drowns in it, and a scene in other units
-has another error. So the images may be divided by a `unit` first. With 1 the numbers are those that the tools print;
-with the mean of the reference they do not depend on the unit, and 0.01 is one percent of the mean.
+has another error. The images may therefore be divided by a `unit` first. With 1 the numbers are as the tools print
+them; with the mean of the reference they do not depend on the unit, and 0.01 is one percent of the mean.
 
-**Ours** divides by the reference itself. Where that is below f = 0.001 mean(r), black pixels among them, a ratio says
-nothing: these values are left out, counted (`dark`), and their largest error is given in absolute terms. Values that
-are left out of a mean cannot be forgotten this way.
+**Ours** divides by the reference itself. Where it is below f = 0.001 mean(r), black pixels among them, a ratio says
+nothing: these values are left out of the mean and counted (`dark`), and their largest error is given in absolute terms,
+so that they are not forgotten.
 
 **PSNR** has no meaning of its own for radiance without an upper bound; with the reference's peak it is -10 log10 of a
 relative mean square error, and one bright pixel rules it. It is here because papers print it.

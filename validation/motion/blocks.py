@@ -2,8 +2,8 @@
 """Regressions over many frames whose standard errors hold for pixels that are correlated in place and time.
 
 The pixels of a block, with all their frames, are left out in turn (a jackknife): no independence is assumed within a
-block. What a regression needs of a block is the matrix of the products of its columns, so frames are read one by one
-and only these matrices are kept. Blocks are collected in at most `GROUPS` groups, neighbours in different ones.
+block. A regression needs only the matrix of the products of a block's columns, so frames are read one by one and only
+these matrices are kept. Blocks are collected in at most `GROUPS` groups, neighbours in different ones.
 """
 
 from dataclasses import dataclass

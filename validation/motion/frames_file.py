@@ -34,7 +34,7 @@ _FARTHEST = 1.0  # that rays are jittered [pixels]: what is more is in other uni
 
 @dataclass(frozen=True)
 class FramesRecord:
-    """What the frames of a sequence show."""
+    """The description of a sequence of frames."""
 
     frames: int
     scene: str | None = None

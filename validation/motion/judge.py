@@ -52,7 +52,7 @@ _BESIDE = 1.0  # of a lamp [pixels]
 
 @dataclass(frozen=True)
 class MotionVerdict:
-    """What is said of a sequence."""
+    """The verdict on a sequence."""
 
     kind: str  #: 'exact', 'noise', 'lag', 'late', 'ghost', 'not one lag' or 'cannot be told'
     words: str

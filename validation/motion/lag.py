@@ -5,13 +5,13 @@
 
     t_n = c m + g y_n,    y_n = a y_(n-1) + (1 - a) r_(n-d),    y = r where a history begins
 
-has an offset c, a gain g, a persistence a and a whole delay d. Light that is shown has the mean age d + a/(1 - a): the
-lag. What is missing after a step falls as exp(-n/tau), tau = -1/ln a. All frames are fitted at once: the regression of
-a frame on the one before is wrong where noise comes after the history. Offset and gain are fitted too: without them a
+has an offset c, a gain g, a persistence a and a whole delay d. Light in a frame has the mean age d + a/(1 - a): the
+lag. The error after a step falls as exp(-n/tau), tau = -1/ln a. All frames are fitted at once: the regression of a
+frame on the one before is wrong where noise comes after the history. Offset and gain are fitted too: without them a
 bias looks like a lag.
 
 **Which lag there is, if any.** The impulse response is the best t_n = c m + sum of h_k r_(n-k), k from 0 to 15, h >= 0.
-What a lag describes of it is the fraction of what both leave less than no filter at all.
+`described` is the improvement of a lag over no filter, as a fraction of the improvement of the impulse response.
 
 Squares count with 1/(r + 0.1 m)^2, r the mean of a value in time: otherwise a few bright pixels rule. Filters in time
 commute with means over pixels, so means over cells of 4 x 4 pixels are fitted.

@@ -6,8 +6,8 @@ With r_n the reference of frame n, t_n the frame, e = t - r, and m the mean of r
 - relative RMSE: the root mean square of e, over m;
 - relative bias: the mean of e over m. It has an error only where the means of the frames are independent: from an
   autocorrelation of 3 over the root of their number on they are not, and several runs of the sequence are needed;
-- flicker: the root mean square of e_n - e_(n-1), over m: the change of the reference is out of it. Beside the lag: the
-  same of t - c m - g y, what no lag explains (`validation.motion.lag`);
+- flicker: the root mean square of e_n - e_(n-1), over m: it leaves out the change of the reference. Flicker beside the
+  lag: the same for t - c m - g y, the part that no lag explains (`validation.motion.lag`);
 - ghost: light that left a place in the last twelve frames is w = max(r_(n-12) .. r_n) - r_n; the fraction G of it that
   is still there is a coefficient of e = c m + b r + G w. By age k, w is max(r_(n-k) - r_n, 0);
 - trail: the error where w is above 0.05 m;
@@ -70,7 +70,7 @@ class Sequence:
 
 @dataclass(frozen=True)
 class Measures:
-    """What a sequence is like; everything relative is so to the mean of the references."""
+    """The measures of a sequence; relative values are relative to the mean of the references."""
 
     values: int  #: in all frames, that count
     nonfinite: int  #: values of frames that are NaN or infinite

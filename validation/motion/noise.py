@@ -12,18 +12,18 @@ mean of the reference, and G_ij the mean of e_i e_j over values,
 
 Errors of V and b^2 come from leaving out one run at a time. N runs averaged have the error sqrt(b^2 + V/N).
 
-**Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that few runs have none:
-their mean is too dark, and so is their spread too small. Of a sum of independent deviations x with skewness g = sum of
-x^3 over (sum of x^2)^(3/2), an interval of 95 % lies below the mean in 2.5 % + 0.084 g of all cases, by the first term
-of Edgeworth's series. |g| is at most the root of the largest fraction of a value in the sum of squares. From a fraction
-of 1 % on, where g may be 0.1 (where channels agree, 0.17), no bias against the largest deviation is told, and no want
-of one. A bias towards it is: there the interval is too wide. Where the variance exists the fraction falls with the
-runs.
+**Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that a few runs may have
+none: their mean is then too dark and their spread too small. For a sum of independent deviations x with skewness g =
+sum of x^3 over (sum of x^2)^(3/2), an interval of 95 % lies below the mean in 2.5 % + 0.084 g of all cases, by the
+first term of Edgeworth's series. |g| is at most the root of the largest fraction of a value in the sum of squares. From
+a fraction of 1 % on, where g may be 0.1 (where channels agree, 0.17), neither a bias against the largest deviation nor
+its absence is reported. A bias towards the largest deviation is reported, as there the interval is too wide. Where the
+variance exists the fraction falls with the runs.
 
 **Noise between pixels.** With n_i = (e_i - mean of e) sqrt(N/(N - 1)) the error spectrum is the periodogram of n_i over
 its mean square, in rings of the frequency: white noise is 1 everywhere, however unequal the pixels are (Celarek, Jakob,
 Wimmer and Lehtinen 2019). The low fraction is its mean below 1/8 cycle a pixel: below 0.3 the noise is blue, above 1.5
-it is filtered. The blur gain is the root mean square of n after a Gaussian of deviation s over that before, times
+it is filtered. The blur gain is the root mean square of n after a Gaussian of deviation s over the value before, times
 2 sqrt(pi) s: 1 for white noise.
 """
 
@@ -63,7 +63,7 @@ _POWER, _LEVEL = 0.9, 0.05  # with which a bias is detected
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """What independent renders of a frame are like; everything is relative to the mean of the reference."""
+    """The noise of independent renders of a frame; all is relative to the mean of the reference."""
 
     runs: int
     bias: Estimate
@@ -88,7 +88,7 @@ class Noise:
 
     @property
     def words(self) -> str:
-        """What is said of bias and noise."""
+        """The verdict on bias and noise."""
         low, high = (100 * end for end in self.bias_ci)
         if self.runs == 1:
             return f"no random numbers: all of its error is bias, {low:+.3g} % in the mean"
@@ -261,7 +261,7 @@ class NoiseComparison:
 
     @property
     def words(self) -> str:
-        """What is said of bias and noise."""
+        """The verdict on bias and noise."""
         return self.noise.words
 
     def to_json(self) -> dict[str, Any]:

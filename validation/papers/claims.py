@@ -79,7 +79,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What measures the figures of some claims."""
+    """The measurement of the figures of some claims."""
 
     function: str  #: of a module beside this one, 'module:function'; called without arguments it gives the figures
     seconds: float  #: that it takes on two threads, about

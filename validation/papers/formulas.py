@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Formulas as they are printed beside what they must be, and the droplets of Bouthors 2008: no image is needed.
+"""Formulas as printed against their correct forms, and the droplets of Bouthors 2008: no image is needed.
 
 `realtime.kernels.taylor` holds the annex of Biri 2006 as transcribed, `analytic.series` derives it, and
 `analytic.droplets` is Mie's theory. Integrands are written here as the papers print them and integrated by QUADPACK.
 
-What the misprints of the annex cost ray by ray: both polynomials of degree 4, and the certified kernel beside them, run
-on the set of rays `validation.kernels.rays.wide_rays` in float64, so that rounding plays no part. The paper does not
-claim its polynomial everywhere, so fractions are also given in two regions of the set:
+The effect of the misprints of the annex, ray by ray: both polynomials of degree 4, and the certified kernel, run on the
+set of rays `validation.kernels.rays.wide_rays` in float64, so that rounding plays no part. The paper does not claim its
+polynomial everywhere, so fractions are also given in two regions of the set:
 
 moderate        what scenes are made of: optical depth 0.01 to 5 at the distance of the light, angle to the light 1 to
                 179 degrees, length 0.05 to 10 distances
@@ -121,7 +121,7 @@ def _cloud_equations() -> dict[str, float]:
     kappa, x0, x1, l0, l1 = 0.05, 3.0, 19.0, 11.0, 4.0
     depth = quad(lambda x: kappa * np.exp(-kappa * (x + l0 + (l1 - l0) * (x - x0) / (x1 - x0))), x0, x1)[0]
     opacity = quad(lambda x: np.exp(-kappa * x), x0, x1)[0]
-    # Of a constant field nothing changes along a path, so the right side of eq. 5, lost light and gained, must be 0.
+    # A constant field does not change along a path, so the right side of eq. 5, lost light and gained, must be 0.
     gained = quad(lambda cos: 1.0, -1, 1)[0] / 2
     return {
         "eq. 1": float((np.exp(-kappa * (x1 + l1)) - np.exp(-kappa * (x0 + l0))) / depth),
@@ -159,7 +159,7 @@ class WithinError:
 def printed_against_derived(count: int = 100_000, *, kernels: Mapping[str, Kernel] = COMPARED) -> Iterator[WithinError]:
     """Yield for each of the paper's phase functions, region and kernel which fraction of rays is how accurate.
 
-    Of each phase function there are `count` rays, at most 2^20; a power of two keeps them balanced.
+    Each phase function has `count` rays, at most 2^20; a power of two keeps them balanced.
     """
     for phase in PRINTED_PHASES:
         cases = wide_rays(count, phase)

@@ -103,12 +103,12 @@ def _sphere(facets: int) -> Scene:
 
 
 def tessellation() -> dict[str, Any]:
-    """Return what holds of the mesh of the colonnade, and what two filters and two treatments of depths cost.
+    """Return facts on the mesh of the colonnade, and the errors of two filters and two treatments of depths.
 
-    Of its quads there are the number of `configurations` that occur, and the `most triangles`; `level steps` is the
-    largest difference of levels between neighbours, `flat` and `jump` are the median sides of the quads without and
-    with a jump of the map [texels]. `our error` and `plain error` are those of the airlight to that of the static mesh;
-    `bias ...` and `best bias` the relative RMSE of the sum with depth testing to the clamped sum.
+    `configurations` is the number of kinds of quads that occur, `most triangles` the most in a quad; `level steps` is
+    the largest difference of levels between neighbours, `flat` and `jump` are the median sides of the quads without and
+    with a jump of the map [texels]. `our error` and `plain error` compare the airlight with that of the static mesh;
+    `bias ...` and `best bias` are the relative RMSE of the sum with depth testing to the clamped sum.
     """
     scene = read_scene(load_scene("colonnade", SIZE).scene)
     light = scene.lights[0]

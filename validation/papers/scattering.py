@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Biri 2006 and Billeter 2010 leave out of the light: multiple scattering, and the constant R of bounded media.
+"""Approximations of the light in Biri 2006 and Billeter 2010: multiple scattering, and the constant R of bounded media.
 
-*Ambient fog.* Biri adds a constant ambient light in the medium, albedo A (1 - exp(-sigma_t x)), in place of what
-scatters more than once. `volpath` with long paths less `volpath` with one scattering, of the same seeds, is what it
-should be, of the medium alone. The constant A that fits best is a least-squares fit over the pixels and channels of an
-image. What is then left over is taken from two images M1, M2 of other seeds, sqrt(mean((M1 - m)(M2 - m)) / mean(M1
-M2)), so that the noise of the paths does not count.
+*Ambient fog.* Biri adds a constant ambient light in the medium, albedo A (1 - exp(-sigma_t x)), in place of multiple
+scattering. The right value, for the medium alone, is `volpath` with long paths less `volpath` with one scattering, of
+the same seeds. The constant A that fits best is a least-squares fit over the pixels and channels of an image. The
+residual is computed from two images M1, M2 of other seeds, sqrt(mean((M1 - m)(M2 - m)) / mean(M1 M2)), so that the
+noise of the paths does not count.
 
 *The constant R* (section 4.2). The camera looks at a sphere of one medium in vacuum, which a lamp outside the sphere
 lights from above. R, the mean distance between a point of the boundary and a point of the medium, is 1.2 radii in a

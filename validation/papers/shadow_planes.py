@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shadow planes of Biri 2006: what their order and other shortcuts cost in images, and the stencil along a ray.
+"""Shadow planes of Biri 2006: the errors of their order and other shortcuts in images, and the stencil along a ray.
 
-Errors are relative RMSE and relative bias of the airlight against the quadrature. What is noticeable is what an 8-bit
-display shows: by how many of its 255 steps 99 % of the pixels are right, with the radiance `white` shown as 255.
+Errors are relative RMSE and relative bias of the airlight against the quadrature. Whether an error is noticeable is
+judged on an 8-bit display: the number of its 255 steps within which 99 % of the pixels are right, with `white` shown as
+255.
 
 The stencil of sections 5 and 5.1.5 needs no image. Along a ray a shadow is an interval [a, b]. Its plane at a faces the
-camera, that at b faces away. Planes are drawn from the surface towards the camera: one that faces the camera adds
+camera, its plane at b faces away. Planes are drawn from the surface towards the camera: one that faces the camera adds
 Gamma(a) where the stencil is 1, one that faces away subtracts Gamma(b) where it is 0. In section 5, stage 5, planes
 that face the camera then increment the stencil; in 5.1.5 they decrement it. Any increasing function serves as Gamma; x
 does.

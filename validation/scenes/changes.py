@@ -110,7 +110,7 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
             points = np.reshape(parameters[vertices], (-1, 3)) @ matrix[:3, :3].T + matrix[:3, 3]
             parameters[vertices] = type(parameters[vertices])(points.ravel())
             if normals in parameters and len(parameters[normals]):
-                # Of unit length whatever the scale: the matrix is a rotation times a number.
+                # Unit length for any scale: the matrix is a rotation times a number.
                 turned = np.reshape(parameters[normals], (-1, 3)) @ matrix[:3, :3].T / np.cbrt(np.linalg.det(matrix))
                 parameters[normals] = type(parameters[normals])(turned.ravel())
         elif place in parameters:

@@ -13,9 +13,9 @@ The extinction at a height z is, times the medium's `scale`,
 
     sigma_0 + sigma_1 exp(-(z - z_1)/H_1) + sigma_2 exp(-(z - z_2)/H_2)     [1/m],
 
-with max(z - z_i, 0) for z - z_i if `clamped` is true. What is not given is 0. `to_world` takes the unit cube to a box:
-its third axis is up, its lower and upper end are the floor and the cap of the fog, beyond which there is nothing. The
-fog has no sides: Mitsuba gets a box that is a thousand times as wide as it is high at least.
+with max(z - z_i, 0) for z - z_i if `clamped` is true. Numbers that are not given are 0. `to_world` takes the unit cube
+to a box: its third axis is up, its lower and upper end are the floor and the cap of the fog, beyond which there is
+nothing. The fog has no sides: Mitsuba gets a box that is a thousand times as wide as it is high at least.
 
 In place of these numbers it takes an engine's parameters, with `<string name="engine" value="unreal"/>`
 (`validation.scenes.engine_fog`).

@@ -31,9 +31,9 @@ def hypertexture(
 
     The distance is computed on every second voxel, and linear between these; it takes seconds.
 
-    The mesh is closed; there are so many `voxels` along each axis, in a box with a `margin` around the mesh [m]. Of the
-    four octaves of noise there are the size of the first's `cells`, the largest value, `amplitude` [m], and the `seed`;
-    without noise the density rises from 0 to 1 between two `depths` [m].
+    The mesh is closed; `voxels` is their number along each axis, in a box with a `margin` around the mesh [m]. The four
+    octaves of noise have `cells` as the size of the first, the largest value `amplitude` [m], and the `seed`; without
+    noise the density rises from 0 to 1 between two `depths` [m].
     """
     from scipy.ndimage import map_coordinates
 

@@ -337,8 +337,8 @@ def statue(fold: float) -> Mesh:
 def knot(turns: Sequence[int], radii: Sequence[float], thickness: float, cells: Sequence[int]) -> Mesh:
     """Return a tube of uneven section along a knot on a torus about the z axis: 2 cells[0] cells[1] triangles.
 
-    The normal of the torus is perpendicular to every curve on it. So it orients the sections all the way round, and the
-    last section joins the first without a seam.
+    The normal of the torus is perpendicular to every curve on it. It therefore orients the sections all the way round,
+    and the last section joins the first without a seam.
 
     The turns about the axis of the torus and about its core are coprime; the radii are those of the core, and from it
     to the middle of the tube [m]; cells are along and about the tube.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What scenes are made of, for `mi.load_dict`: shapes of meshes, media, phase functions, lights and cameras."""
+"""The parts of scenes, for `mi.load_dict`: shapes of meshes, media, phase functions, lights and cameras."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -125,9 +125,9 @@ def light(type: str, colour: Sequence[float], **given: Any) -> dict[str, Any]:
     """Return a light of a type and a colour, RGB.
 
     'point' and 'spot' have an intensity [W/sr], a 'sun' an irradiance [W/m^2]; 'rectangle', 'disk', 'sphere' and 'sky'
-    a radiance [W/(m^2 sr)]. Of all but sun and sky a `position` is given; of all but these and points a `target`. Of a
-    spot the half angles `cutoff` and `beam` [degrees], and perhaps `up`; of a sun the `direction` of its light; of
-    others `size`, and `opaque`, which is false for a light that only shines.
+    a radiance [W/(m^2 sr)]. All but sun and sky need a `position`; all but these and points a `target`. A spot needs
+    the half angles `cutoff` and `beam` [degrees], and perhaps `up`; a sun the `direction` of its light; others `size`,
+    and `opaque`, which is false for a light that only shines.
     """
     match type:
         case "point":

@@ -21,7 +21,7 @@ A shape, a part of one and a kind is a mesh. `mesh` names a kind or a function o
 keys; or there are `parts`, which are joined. A mesh may be displaced by `waves`, then multiplied by a `scale`, turned
 (`turn`: an axis and an angle) and moved to `at`, and from there by `polar`: a distance and an angle about the vertical.
 
-Of a shape or part with `copies`, copy k has k times the numbers of `step` added to its own, and a shape the name
+If a shape or part has `copies`, k times the numbers of `step` are added to those of copy k, and a shape gets the name
 'NAME-k', from `first` on; with `of` all of that list are copied together. With `sunflower` the copies lie like its
 seeds, and take the kinds of that list in turn.
 """
@@ -64,7 +64,7 @@ MESHES: dict[str, Callable[..., Mesh]] = {
 
 @dataclass(frozen=True)
 class Animation:
-    """What moves in the frames of a scene; `validation.scenes.animation` says how."""
+    """The motion in the frames of a scene; see `validation.scenes.animation`."""
 
     moves: tuple[str, ...] = ("light",)  #: of `MOVES`
     about: tuple[float, float, float] | None = None  #: on the axis that lights circle [m]; None: the scene's middle

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is asked of a slab, with its checks."""
+"""A request for a slab, with its checks."""
 
 import math
 import re

@@ -26,9 +26,9 @@ eight times as well as one pixel.
 pixels share shows here first: with 262 144 pixels 360 times better than in any one of them.
 
 Values without variance (s = 0: a pixel without light, one that no path reached, a reference without noise) have no z.
-They are counted and compared in absolute terms, and they do enter the relative bias. So are values where the reference
-is zero, whose relative error does not exist: light where none should be shows there. Pixels that a mask leaves out (the
-light in their footprint) are counted, for a mask can hide what it should not.
+They are counted and compared in absolute terms, and they do enter the relative bias. The same holds for values where
+the reference is zero, which have no relative error: light where none should be shows there. Pixels that a mask leaves
+out (the light in their footprint) are counted, for a mask can hide what it should not.
 
 The relative bias of a whole image
 ----------------------------------

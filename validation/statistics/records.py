@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What comparisons with random errors say, as rows and reports hold it: without Dr.Jit, what is not known is None."""
+"""Results of comparisons with random errors, for rows and reports, without Dr.Jit; unknown values are None."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -76,7 +76,7 @@ class Fraction:
 
 @dataclass(frozen=True, kw_only=True)
 class MultipleScattering:
-    """What scatters more than once, which every single-scattering method leaves out."""
+    """The multiply scattered light, which every single-scattering method leaves out."""
 
     medium: Fraction  #: of the airlight with black surfaces: light that the medium scattered twice or more
     everything: Fraction  #: also light that met surfaces twice, or surfaces and the medium

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What samples say: p-values and what to do with many of them, intervals of a fraction, a quantile, a rank correlation.
+"""Statistics of samples: one or many p-values, intervals of a fraction, a quantile, a rank correlation.
 
-A sample of an interval is what was drawn independently of the others, such as a scene. What was measured in one scene,
-by pixels or by methods, is one sample however many numbers it has.
+A sample of an interval is one independent draw, such as a scene. All numbers that were measured in one scene, by pixels
+or by methods, are one sample.
 """
 
 from collections.abc import Sequence
@@ -111,14 +111,14 @@ def rank_correlation(x: ArrayLike, y: ArrayLike, level: float = LEVEL) -> tuple[
     sqrt((1 + r^2/2) / (n - 3)).
 
     Valid for |correlation| < 0.95 and n >= 10, by the simulations of Bonett and Wright 2000, *Psychometrika* 65, 23-28,
-    whose standard error it is. Of fewer than ten samples, and where all of x or of y are equal, r is 0 and the interval
-    from -1 to 1: nothing is known.
+    whose standard error it is. For fewer than ten samples, and where all of x or of y are equal, r is 0 and the
+    interval from -1 to 1: nothing is known.
     """
     count = np.size(x)
     if count < 10 or np.ptp(x) == 0 or np.ptp(y) == 0:
         return 0.0, -1.0, 1.0
     r = float(spearmanr(x, y).statistic)
-    # Of one order for both the formula would be certain: it is taken as if two neighbours had changed places.
+    # If both have the same order the formula gives no width: r is taken as if two neighbours had changed places.
     most = 1 - 12 / (count * (count**2 - 1))
     z = np.arctanh(np.clip(r, -most, most))
     half = float(ndtri((1 + level) / 2)) * np.sqrt((1 + r * r / 2) / (count - 3))

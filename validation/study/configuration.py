@@ -116,7 +116,7 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
 def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:
     """Return the frame renderer of a configuration for a scene; `extra_layers` as of `frame_renderer`.
 
-    What the method refuses raises `realtime.errors.InputError`.
+    Raises `realtime.errors.InputError` if the method refuses.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     parameters: dict[str, Any] = dict(chosen.parameters)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a command will take, estimated from counts before it starts, so that an hour or all memory is not a surprise.
+"""The time and memory of a command, estimated from counts before it starts, so that they are not a surprise.
 
 The costs are those of one processor thread, measured on two threads of an AMD EPYC on 22 November 2026 and rounded; a
 scene can be some times cheaper or costlier. That is enough to tell a minute from a day.
@@ -29,7 +29,7 @@ _FRAME_BYTES, _REFERENCE_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
 
 @dataclass(frozen=True)
 class Work:
-    """What some work will take."""
+    """The estimated cost of some work."""
 
     seconds: float  #: on one thread
     memory: float = 0.0  #: at most at once [bytes]

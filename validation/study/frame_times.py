@@ -90,10 +90,11 @@ def time_frame(
 ) -> FrameTimes:
     """Time the stages of a frame, the whole frame, and frames after light, objects or only colours changed.
 
-    So many `seconds` are spent on each of the first three, and half of it on each of the others. If a frame takes
-    longer than `slow` with its preparation [s], `SLOW` by default, frames are run stage by stage and the seven are
-    added up from them: up to five frames in place of some forty. So are images that are rendered in parts. `took` is
-    what the last frame took with its preparation, if one was rendered just before [s]; else two are.
+    `seconds` are spent on each of the first three, and half as long on each of the others. If a frame takes longer than
+    `slow` with its preparation [s], `SLOW` by default, frames are run stage by stage and the seven times are added up
+    from the stages: up to five frames in place of some forty. The same holds for images that are rendered in parts.
+    `took` is the time of the last frame with its preparation, if one was rendered just before [s]; else two are
+    rendered.
     """
     if len(parts(renderer)) > 1:
         return _slow_frame(renderer, turns=3)
@@ -157,7 +158,7 @@ def brief_times(renderer: FrameRenderer) -> tuple[FrameTimes, float]:
 def shader_times(renderer: FrameRenderer, seconds: float | None = None) -> tuple[str, FrameTimes]:
     """Return the device that draws a shader, and the times of all its passes there for so many seconds, by default few.
 
-    What the host hands over and brings back is left out: an engine has its rays and its maps.
+    Transfers from and to the host are left out: an engine has its rays and its maps.
     """
     state = renderer.prepare(renderer.scene)
     run_stages(renderer, state)

@@ -21,7 +21,7 @@ _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
 
 @dataclass(frozen=True)
 class Made:
-    """What computes rows: two workers of one study must agree in all of it."""
+    """The software that computes rows: two workers of one study must agree in all of it."""
 
     airlight: str  #: version
     source: str  #: digest of the source code

@@ -10,7 +10,7 @@
 
 The other kinds keep the image at the size that is asked for.
 
-A flat triangle cut into four has no new silhouette. So all vertices move by one smooth map of space,
+A flat triangle cut into four has no new silhouette. All vertices therefore move by one smooth map of space,
 
     u(p) = p + sum_i a_i sin(k_i . p + i),     |a_i| |k_i| = 0.15,     i = 1 .. 4,
 

@@ -36,7 +36,7 @@ _JUMP = 12  # of a turn, that a step is
 
 @dataclass(frozen=True)
 class MethodMotion:
-    """What the frames of a method are like under a light that moves."""
+    """The quality of a method's frames under a light that moves."""
 
     label: str
     measures: Measures | None  #: None where the reference is dark

@@ -27,7 +27,7 @@ _SURE = 2.0  # standard errors, below which the mean of the runs is not told fro
 
 @dataclass(frozen=True)
 class MethodNoise:
-    """What independent renders by a method are like."""
+    """The noise of independent renders by a method."""
 
     label: str
     noise: Noise

@@ -42,7 +42,7 @@ _STANDARD_ERRORS = 3.0  # that a bound has of an area light
 
 @dataclass(frozen=True)
 class Reference:
-    """What all cells of one image are compared with."""
+    """The reference of all cells of one image."""
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     bound: Array  #: of its error, three standard errors of area lights among it [W/(m^2 sr)]
@@ -58,7 +58,7 @@ class Reference:
 
     @cached_property
     def own_error(self) -> ReferenceError:
-        """What the reference says of its own error."""
+        """The error that the reference states for itself."""
         kept = np.ones(self.airlight.shape[:2], dtype=bool) if self.mask is None else self.mask
         airlight, bound = self.airlight[kept], self.bound[kept]
         mean = float(airlight.mean())

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A row: all that came of one cell. Its columns, with heading, unit and meaning, are the fields of `Row`.
+"""A row: all results of one cell. Its columns, with heading, unit and meaning, are the fields of `Row`.
 
 A row leaves as JSON, records within records, and as a row of a Parquet, whose columns have the paths of the values in
-that JSON as names: `error.relative_rmse`, `times.frame.median_ms`. What is not known, not measured or not finite is
-null, never NaN or an infinity. Beside these columns a Parquet has the scene's properties, `properties.NAME`, those that
-any of its rows has. `key` is the identity of a row: two rows of one key say the same.
+that JSON as names: `error.relative_rmse`, `times.frame.median_ms`. Values that are not known, not measured or not
+finite are null, never NaN or an infinity. In addition a Parquet has the scene's properties, `properties.NAME`, those
+that any of its rows has. `key` is the identity of a row: two rows of one key say the same.
 
 Errors are those of the airlight, by the formulae of `validation.metrics`, as `airlight compare --metrics all` prints
 them. Where the epsilon of a formula is a radiance, `normalised` has the same with the mean of the reference as unit.
@@ -35,7 +35,7 @@ FRAME_MS = "times.frame.median_ms"  #: the column of the time of a frame
 
 @dataclass(frozen=True)
 class ReferenceError:
-    """What the reference of a cell says of itself."""
+    """The reference of a cell and its own error."""
 
     estimator: str = column("reference", "", "estimator of the reference")
     mean: float = column("mean", RADIANCE, "mean of the reference airlight")
@@ -58,7 +58,7 @@ class StatedError:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a cell cost beside the times of its frames."""
+    """The cost of a cell besides the times of its frames."""
 
     first_ms: float = column("first frame", "ms", "from the scene to the first image, compilation included")
     prepare_ms: float | None = column(
@@ -101,7 +101,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of one cell."""
+    """The results of one cell."""
 
     scene: str = column(meaning="built-in scene, 'random:SEED', or the path of a file")
     label: str = column("method", meaning="method, kernel and parameters, such as 'ray-march (steps=16)'")

@@ -273,10 +273,10 @@ def _errors(cell: Cell, frame: Frame, scene: Scene, reference: Reference, whole:
 def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     """Return why a frame would take longer than the limit, or None.
 
-    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's method,
-    by the second frame of a small scene, whose preparation takes as long. Of many groups of lights only the first are
-    prepared before the frame; the others take as long each. Nothing is judged where the making of the renderer, which
-    `took` so long [s], says that it is far below the limit.
+    It is judged by its preparation once kernels are compiled and, where that takes long and for a user's method, by the
+    second frame of a small scene, whose preparation takes as long. If there are many groups of lights, only the first
+    are prepared before the frame; the others take as long each. Nothing is judged where making the renderer `took` so
+    little [s] that a frame is far below the limit.
     """
     chosen, limit = cell.chosen, cell.measure.limit
     if limit is None or not (chosen.own or took * len(light_groups(renderer)) > _DOUBTFUL * limit):

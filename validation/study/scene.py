@@ -85,12 +85,12 @@ class SceneStudy:
 
     @cached_property
     def identity(self) -> str:
-        """What the scene is."""
+        """The identity of the scene."""
         return scene_identity(self.path)
 
     @cached_property
     def configurations(self) -> tuple[Configuration, ...]:
-        """What to measure."""
+        """The configurations to measure."""
         return configurations_for(self.scene.features, self.study.configurations)
 
     @property
@@ -105,7 +105,7 @@ class SceneStudy:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Of the images [pixels]."""
+        """The size of the images [pixels]."""
         return self.study.sizes[0]
 
     @contextmanager
@@ -198,12 +198,12 @@ def study_scene(
     spread: ElsewhereFor | None = None,
     workers: int = 1,
 ) -> SceneResult:
-    """Return what a study says of a scene.
+    """Return the results of a study for a scene.
 
     `images` from elsewhere are judged. `apart` calls a user's method in a process of its own; configurations that
     `ended` such a process before, with how, are not called again. `progress` is called with the name of each part, as
     of `SceneStudy.seconds`, before it begins. `spread` lets other processes trace the batches that check the reference.
-    So many `workers` compute HDR-FLIP at once, each on one processor.
+    `workers` is the number of processes that compute HDR-FLIP at once, each on one processor.
     """
     progress("reference")
     reference, checks = study.kept_reference, study.study.checks
@@ -256,7 +256,7 @@ def multiple_scattering(scene, batches: int, samples: int) -> MultipleScattering
 
 @dataclass(frozen=True)
 class Measured:
-    """What is kept of a row."""
+    """A row with its images."""
 
     row: Row
     layers: dict[str, Layer] = field(default_factory=dict)  #: of its image, the distance among them; none without one

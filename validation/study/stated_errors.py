@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The errors that a method states for itself: what is further from the reference is a fault.
+r"""The errors that a method states for itself: a larger distance from the reference is a fault.
 
-What claims to be exact but for rounding, the kernel `exact` along whole rays where nothing casts a shadow and shadow
-planes in exact order, states three:
+Methods that claim to be exact except for rounding (the kernel `exact` along whole rays where nothing casts a shadow,
+and shadow planes in exact order) state three errors:
 
 * **Rounding** of the pixel, `ROUNDING` of it.
 * **Ends.** A lit interval ends at a surface, at the bounds of a medium or at a shadow plane, at a distance x that is
-  known to some units of float32. With s(x) the radiance that a metre of the ray scatters in full light, that is worth
-  x s(x) times `END`. It is little, but a ray may be lit along little: where it clips the edge of a medium by 37 um at
-  0.66 m, an error of 2.6 units changes its length, and all of its airlight, by 4e-3.
+  known to some units of float32. With s(x) the radiance that a metre of the ray scatters in full light, this error is x
+  s(x) times `END`. It is small, but the lit length may be small, too: where a ray clips the edge of a medium by 37 um
+  at 0.66 m, an error of 2.6 units changes this length, and all of the airlight, by 4e-3.
 
-  A ray that meets the bounds of a medium at a small angle knows the place less well. In x = n . (p - o)/(n . d) the
+  The place where a ray meets the bounds of a medium at a small angle is less accurate. In x = n . (p - o)/(n . d) the
   direction d is rounded, and so are the three products of the divisor, which are not small where their sum, the cosine
   c, is: x is known to x `END`/|c|. A sphere of radius r has the same law: with b the distance of its middle from the
   ray and h = sqrt(r^2 - b^2) half of the chord, dh = b/h db, where b is known to x `END` and c = h/r.

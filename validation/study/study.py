@@ -2,7 +2,7 @@
 """A study: which scenes, methods, parameters, media and sizes, as a TOML file says it, and the cells that come of it.
 
 A cell is one combination of all of these; docs/many-scenes.md has the keys of a file. Every mistake is refused by name
-before any work. What a report measures is a study too (`validation/study/studies/`), which says more:
+before any work. The measurements of a report are a study too (`validation/study/studies/`), with more keys:
 
     scenes = "all"                                          # every built-in scene of fog
     half = ["fence"]                                        # scenes that are compared at half the width
@@ -82,7 +82,7 @@ _MOST_SCENES = 10_000_000
 
 @dataclass(frozen=True)
 class Measure:
-    """What to measure of a cell beside its errors."""
+    """The measurements of a cell besides its errors."""
 
     times: str = "with"  #: one of `TIMES`
     seconds: float = 0.6  #: spent on each of the times of 'stages'
@@ -133,7 +133,7 @@ class Checks:
 
 @dataclass(frozen=True)
 class Study:
-    """What a study file says; the defaults are those of a study without a file."""
+    """A study file; the defaults are those of a study without a file."""
 
     name: str = "sweep"
     scenes: tuple[str, ...] = ()
@@ -197,7 +197,7 @@ class Study:
 
     @cached_property
     def _options(self) -> str:
-        """What follows the seed in the names of its random scenes."""
+        """The part after the seed in the names of its random scenes."""
         return random_name("", self.random.ranges).removeprefix(PREFIX)
 
     def _drawn(self, name: str) -> bool:

@@ -2,8 +2,8 @@
 """Scene files as people write them, made into what both readers take, once for every command.
 
 Mitsuba's parser gives nodes before anything is built. Here old media get extinction and albedo, instances are written
-out, lamps on flat quads become rectangles, and references to media that say what is so anyway are left out; what no
-command can take is refused in Mitsuba's own words. What was changed is said in notes, as warnings in Mitsuba's log.
+out, lamps on flat quads become rectangles, and redundant references to media are left out; features that no command can
+take are refused in Mitsuba's own words. Changes are reported in notes, as warnings in Mitsuba's log.
 
 Read in this order:
 

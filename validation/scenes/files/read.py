@@ -31,7 +31,7 @@ _FILM = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_
 def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> Any:
     """Read a scene file with what Mitsuba has in place of a scene where it holds none.
 
-    Isotropic media get the mean cosines that `lobes` has for their ids. What no command can take is refused.
+    Isotropic media get the mean cosines that `lobes` has for their ids. Features that no command can take are refused.
     """
     config = mi.parser.ParserConfig(mi.variant())
     resolver = mi.file_resolver()

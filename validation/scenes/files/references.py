@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""References of opaque shapes to media: left out where they say what is so anyway, refused where they contradict.
+"""References of opaque shapes to media: left out where they are redundant, refused where they contradict.
 
-Mitsuba asks for the media on both sides of every shape, and old manuals did so for walls and lamps. What fills space is
-known from the camera and from the bounds of media; a wall or a lamp adds nothing to it.
+Mitsuba asks for the media on both sides of every shape, and old manuals did so for walls and lamps. The camera and the
+bounds of media determine the medium at every place; a wall or a lamp adds nothing.
 """
 
 from collections.abc import Sequence
@@ -91,7 +91,7 @@ def _is_opaque(shape: Any) -> bool:
 
 
 class _Space:
-    """What fills space: the camera's medium, or what surrounds all bounds, and what is within them."""
+    """The media in space: the medium around all bounds, and the media within them."""
 
     def __init__(self, sensor: Any, bounds: Sequence[Any]) -> None:
         self._bounds = scene_of(bounds) if bounds else None

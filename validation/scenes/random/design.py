@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The design: scene SEED is point SEED of one scrambled Halton sequence, whose beginning covers the ranges evenly.
 
-What a scene has once or may have first (the optical depth, how many lights, the kind of each) is a coordinate of the
-point. What it has many of, such as the places of occluders, comes from a stream of random numbers that the seed begins.
-The scrambling (random permutations of digits, Owen 2017) is the same for all seeds; without it neighbouring
-coordinates of such a sequence are correlated.
+Scene-wide choices (the optical depth, how many lights, the kind of each) are coordinates of the point. Repeated
+choices, such as the places of occluders, come from a random generator that is seeded with SEED. The scrambling (random
+permutations of digits, Owen 2017) is the same for all seeds; without it neighbouring coordinates of such a sequence are
+correlated.
 
-`ranges.toml` covers the methods' whole field; a file of one's own overrides it. A pair is a range, a table of numbers
-are the weights of a choice.
+`ranges.toml` covers the methods' whole field; a user's file overrides it. A pair is a range, a table of numbers are the
+weights of a choice.
 """
 
 import math

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Media of random scenes, an unbounded one, bounded ones or both, and how bright a light makes them without shadows.
 
-Bounds are convex bodies within a ball. Of each the radius of a ball inside of it is known: where the camera shall be
-in a medium it is in that ball. The balls around bounds are disjoint.
+Bounds are convex bodies within a ball. The radius of a ball inside each body is known: a camera that is to be
+in a medium is put into this ball. The balls around bounds are disjoint.
 
-A light is as bright as drawn whatever the optical depth and its distance: its intensity follows from what a unit of it
-does. Shadows and bounds are approximations there; nothing but the exposure of the image depends on them.
+The brightness of a light is drawn for any optical depth and distance: its intensity follows from the effect of a unit
+intensity. Shadows and bounds are approximated there; only the exposure of the image depends on them.
 """
 
 import math

@@ -2,8 +2,8 @@
 """Scenes drawn from a seed, under the name `random:SEED`.
 
 A name may go on: `random:7,ranges=FILE.toml` draws from other ranges, and takes the .obj and .ply files of a folder
-that they name as occluders too; commas and per cent signs of a path are written as in a URL. What is drawn where too
-little light reaches what the camera sees is drawn again.
+that they name as occluders too; commas and per cent signs of a path are written as in a URL. A scene in which too
+little light reaches the view is drawn again.
 
 All is drawn in radii of a stage about the origin, then scaled and moved to an arbitrary place, once.
 """
