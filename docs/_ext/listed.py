@@ -33,7 +33,7 @@ _RESULTS = (
     "reports.api.comparisons.SceneComparison",
     "reports.api.comparisons.Fitted",
     "reports.api.report.Report",
-    "reports.studies.result.Study",
+    "reports.studies.registry.Study",
     "reports.studies.methods.MethodsStudy",
     "reports.studies.kernels.Integrals",
     "reports.studies.clouds.SlabStudy",

@@ -13,8 +13,8 @@ from shown import scene_picture
 
 from reports.data import records
 from reports.tables.agreement import left_out_table
+from reports.tables.costs import cost_table
 from reports.tables.drawing import markdown
-from reports.tables.kernels import cost_table
 from reports.tables.methods import COLUMNS, fastest_table, method_row
 from reports.tables.table import Column, Name, Row, Table, number
 from validation.columns import record_of

@@ -63,7 +63,7 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
 
     activate()
     if isinstance(scene, str | os.PathLike) and Path(scene).is_dir():
-        from reports.interchange.folder import describe_folder
+        from reports.interchange.words import describe_folder
 
         if size or files:
             raise InputError(f"scene: got the folder {scene}; leave out size and output")
@@ -161,7 +161,7 @@ def view(
     variant = activate()
     from reports.view.server import Server
     from reports.view.session import Session
-    from reports.view.state import ViewState
+    from reports.view.widgets import ViewState
 
     assert pixels is not None
     session = Session(ViewState(str(scene), pixels, chosen, changes), variant)

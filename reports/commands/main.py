@@ -41,11 +41,10 @@ from reports.machine.environment import (
     install_line,
     missing_packages,
 )
+from reports.studies.registry import ENDINGS as STUDY_ENDINGS
 from reports.studies.registry import STUDIES, find_study
 from reports.studies.registry import study as run_study
-from reports.studies.result import ENDINGS as STUDY_ENDINGS
-from reports.tables.record import Result
-from reports.tables.terminal import colours_wanted, print_json, terminal_width
+from reports.tables.record import Result, colours_wanted, print_json, terminal_width
 
 DONE, FAILED, WRONG_INPUT, MISSING = 0, 1, 2, 3
 

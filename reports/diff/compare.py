@@ -15,7 +15,7 @@ from reports.data.records import MethodRow, Report, Scene
 from reports.diff.times import Finding, TimeComparison, compare_times
 from reports.report.claims import confirmed
 from reports.tables.agreement import verdict
-from reports.tables.scaling import TIMES, WORK, same_records
+from reports.tables.costs import TIMES, WORK, same_records
 from reports.tables.table import Column, Table, table, words
 from validation.metrics.errors import Metrics
 from validation.papers.claims import Judged

@@ -5,8 +5,7 @@
 
 Read in this order:
 
-- `filters.py`: how numbers are written, and sentences made of data
-- `tables.py`: the tables of the page
+- `filters.py`: how numbers are written, sentences made of data, the tables
 - `chart.py`: speed against error, as SVG
 - `image_codec.py`: images as integers that compress well
 - `image_index.py`: what the script of the page reads

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 from analytic.errors import InputError
 from reports.data.records import Method, Report, Scene
 from reports.page.chart import scene_chart, speed_error_chart
-from reports.page.filters import FILTERS, KINDS, MARKS, kept_words, viewer_words
+from reports.page.filters import FILTERS, KINDS, MARKS, TABLES, kept_words, trust_words, viewer_words
 from reports.page.image_index import SceneImages, page_images
-from reports.page.tables import TABLES, trust_words
-from reports.plotting.colour_maps import signed_colours, unsigned_colours
+from reports.plotting.pictures import signed_colours, unsigned_colours
 
 if TYPE_CHECKING:
     import jinja2

@@ -6,7 +6,6 @@
 Read in this order:
 
 - `style.py`: a colour and a marker for each method and kernel
-- `colour_maps.py`: colours of error maps
 - `pictures.py`: radiance and errors as 8-bit pictures
 - `figure.py`: an empty figure, and how it becomes a file
 """

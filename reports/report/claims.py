@@ -18,8 +18,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from realtime.methods.shader.source import is_users
 from reports.data.records import Claim, MethodRow, Scene
 from reports.tables.agreement import margin_words, verdict, worst_interval
+from reports.tables.costs import WORK, cliffs
 from reports.tables.methods import published_as
-from reports.tables.scaling import WORK, cliffs
 from validation.statistics.records import Agreement
 from validation.timing import Scaling
 

@@ -3,13 +3,9 @@
 
 Read in this order:
 
-- `result.py`: what a study returns
+- `registry.py`: what a study returns, the studies by name, and `airlight.study`
 - `methods.py`: methods timed and compared, errors by cause, growth with the work, sizes of shadow maps
-- `kernels.py`: kernels timed, where they break, integrals of a file
-- `series.py`: Biri's polynomials
-- `noise.py`: bias apart from noise, by independent runs
-- `motion.py`: flicker, lag and ghosts under a light that moves
-- `transmittance.py`: estimators of transmittance in a density grid
+- `kernels.py`: kernels timed, where they break, integrals of a file, Biri's polynomials
+- `variation.py`: bias apart from noise, flicker and lag under a light that moves, estimators of transmittance
 - `clouds.py`: a slab by order of scattering
-- `registry.py`: the studies by name, and `airlight.study`
 """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from analytic.errors import InputError
 from reports.api.inputs import Progress, Words, one_error, several, telling
-from reports.studies.result import Study
+from reports.studies.registry import Study
 from reports.tables.table import Column, Table, numbers, table, words
 
 if TYPE_CHECKING:

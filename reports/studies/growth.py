@@ -24,7 +24,7 @@ from reports.api.inputs import (
 )
 from reports.machine.progress import counted, part_of
 from reports.studies.methods import cells_of, check_study, loaded_scenes, scene_by_scene
-from reports.studies.result import FRACTION, Study, with_environment
+from reports.studies.registry import FRACTION, Study, with_environment
 from reports.tables.table import numbers, table
 from validation.timing import Scaling, StepCost
 
@@ -57,7 +57,7 @@ def scaling(
         Called with (fraction done, what); True shows a bar.
     """
     from reports.api.render import asked_configurations
-    from reports.tables.scaling import cliffs, scaling_tables
+    from reports.tables.costs import cliffs, scaling_tables
     from validation.study.growth import study_growth
     from validation.study.ladders import ladder
     from validation.study.study import GROWTH, standard_study
@@ -91,7 +91,7 @@ def _draw_scaling(records: list[Scaling], column: str) -> Any:
     """Return the time of a frame over its work, by kind of work, with the fitted exponents and the camera rays."""
     from reports.plotting.figure import new_figure
     from reports.plotting.style import WIDTHS, method_style
-    from reports.tables.scaling import WORK
+    from reports.tables.costs import WORK
 
     kinds = list(dict.fromkeys(record.kind for record in records))
     width, double = WIDTHS[column], column == "double"

@@ -20,7 +20,7 @@ from reports.api.inputs import (
     with_kernels,
 )
 from reports.machine.progress import part_of
-from reports.studies.result import FRACTION, Study, with_environment
+from reports.studies.registry import FRACTION, Study, with_environment
 from reports.tables.table import Row, Table, table, table_of, words
 from validation.columns import shown_values
 

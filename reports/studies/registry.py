@@ -1,12 +1,104 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The studies by name, and `airlight.study`."""
+"""The studies by name, what a study returns, and `airlight.study`."""
 
 import importlib
 import inspect
-from collections.abc import Callable
-from typing import Any
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError, nearest
+from reports.tables.record import Said
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+FRACTION = {"digits": 2, "fraction": True}  #: how an error relative to the reference is printed
+ENDINGS = (".csv", ".tex", ".md", ".json", ".pdf", ".png")  #: of the files that `Study.save` writes
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Study(Said):
+    """The outcome of a study; its data are what `airlight study NAME --json` prints."""
+
+    rows: tuple[Mapping[str, Any], ...] = ()  #: a row for each measurement, plain numbers by name
+    draw: "Callable[[str], Figure] | None" = None  #: returns the figure for a column, 'single' or 'double'
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Mapping[str, Any]]:
+        return iter(self.rows)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.rows[index]
+
+    @property
+    def title(self) -> str:
+        """Its name."""
+        return f"{self.name}, {len(self.rows)} rows" if self.rows else self.name
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Return the rows as columns by name, as `pandas.DataFrame` takes them."""
+        names = dict.fromkeys(name for row in self.rows for name in row)
+        return {name: [row.get(name) for row in self.rows] for name in names}
+
+    def save(self, path: Path | str, column: str = "double") -> Path:
+        """Write the tables (.csv, .tex, .md), the data (.json) or the figure (.pdf, .png); return the path.
+
+        Parameters
+        ----------
+        path
+            Of the file; its ending says what is written.
+        column
+            Of a figure: 'single' (3.5 inches) or 'double' (7.16 inches).
+
+        Raises
+        ------
+        InputError
+            For another ending, and a figure that the study has not.
+        """
+        from reference.storage.files import write_text
+        from reports.tables.drawing import csv, latex, markdown
+
+        target = Path(path)
+        if target.suffix in (".pdf", ".png"):
+            if self.draw is None:
+                raise InputError(f"{target}: the study {self.name} has no figure; write .csv, .tex, .md or .json")
+            from reports.plotting.figure import save_figure
+
+            return save_figure(target, self.draw, column)
+        if target.suffix == ".csv":
+            write_text(target, _rows_csv(self.rows) if self.rows else "\n".join(map(csv, self.tables)))
+        elif target.suffix == ".tex":
+            write_text(target, "\n".join(latex([table]) for table in self.tables))
+        elif target.suffix == ".md":
+            write_text(target, "\n".join(map(markdown, self.tables)))
+        elif target.suffix == ".json":
+            write_text(target, json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+        else:
+            raise InputError(f"output: got {str(path)!r}, wanted a name that ends in {', '.join(ENDINGS)}")
+        return target
+
+
+def _rows_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    from reports.tables.drawing import csv
+    from reports.tables.table import Column, table
+
+    names = dict.fromkeys(name for row in rows for name in row)
+    return csv(table("", [Column(name, name) for name in names], [dict(row) for row in rows]))
+
+
+def with_environment(**data: Any) -> dict[str, Any]:
+    """Return data with the machine and the versions that made them."""
+    from reports.machine.environment import describe_environment
+    from validation.columns import plain
+
+    return {"environment": describe_environment(), **plain(data)}
+
 
 #: Study -> the module of its function, which has the same name; imported when one is asked for.
 STUDIES = {
@@ -17,10 +109,10 @@ STUDIES = {
     "kernels": "kernels",
     "stability": "kernels",
     "integrals": "kernels",
-    "polynomials": "series",
-    "noise": "noise",
-    "motion": "motion",
-    "transmittance": "transmittance",
+    "polynomials": "kernels",
+    "noise": "variation",
+    "motion": "variation",
+    "transmittance": "variation",
     "slab": "clouds",
 }
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.sweep.read import Sweep
-from reports.sweep.samples import FAULTS, Sample
+from reports.sweep.samples import FAULTS, Sample, Sweep
 from validation.columns import column
 from validation.study.row import PROPERTY
 

@@ -13,8 +13,7 @@ import numpy as np
 from reports.plotting.figure import new_figure, plain_times, short
 from reports.plotting.style import report_styles
 from reports.sweep.claims import TARGETS
-from reports.sweep.read import Numbers
-from reports.sweep.samples import Sample
+from reports.sweep.samples import Numbers, Sample
 from reports.sweep.summary import Summary
 
 if TYPE_CHECKING:

@@ -15,15 +15,13 @@ import numpy as np
 from reference.storage.files import ensure_folder, write_bytes, write_text
 from reports import __version__
 from reports.page.chart import svg_text
-from reports.page.filters import percent, unbroken
+from reports.page.filters import drawn, facts, percent, unbroken
 from reports.page.render import page_environment, template_text
-from reports.page.tables import drawn, facts
 from reports.plotting.figure import file_bytes
 from reports.sweep import tables
-from reports.sweep.claims import TARGETS
-from reports.sweep.correlations import LEAST, NAMED, SAME, property_words
+from reports.sweep.claims import LEAST, NAMED, SAME, TARGETS, property_words
 from reports.sweep.figures import drawn as drawn_figures
-from reports.sweep.read import read_sweep
+from reports.sweep.samples import read_sweep
 from reports.sweep.summary import Summary, headlines, sound_words, summary_of, to_json
 
 PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep

@@ -9,11 +9,20 @@ from typing import Any
 import numpy as np
 
 from reports.data.records import Claim as Headline
-from reports.sweep.claims import TARGETS, Claim, best_claims, claims, percent, written
-from reports.sweep.correlations import Correlation, correlations, property_words, strongest
+from reports.sweep.claims import (
+    TARGETS,
+    Claim,
+    Correlation,
+    best_claims,
+    claims,
+    correlations,
+    percent,
+    property_words,
+    strongest,
+    written,
+)
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
-from reports.sweep.read import Numbers, Sweep
-from reports.sweep.samples import FAULTS, Fastest, Sample, drawn_at_random, fastest_within, samples
+from reports.sweep.samples import FAULTS, Fastest, Numbers, Sample, Sweep, drawn_at_random, fastest_within, samples
 from validation.columns import plain
 from validation.statistics.samples import LEVEL, binomial_interval, quantile_interval
 

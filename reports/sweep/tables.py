@@ -3,8 +3,7 @@
 
 import numpy as np
 
-from reports.sweep.claims import TARGETS, written
-from reports.sweep.correlations import property_words
+from reports.sweep.claims import TARGETS, property_words, written
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
 from reports.sweep.summary import Summary, quantiles

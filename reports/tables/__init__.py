@@ -8,11 +8,9 @@ Read in this order:
 
 - `table.py`: the record, its values, and how a number becomes digits
 - `drawing.py`: the five ways to draw it
-- `record.py`: what every result of a public function knows: tables, words, data
-- `terminal.py`: how commands print tables and JSON
+- `record.py`: what every result of a public function knows: tables, words, data; JSON on the terminal
 - `methods.py`: what methods cost and how wrong they are; the fastest within an error; which are a paper as published
 - `papers.py`: verdicts on the claims of papers, and their numbers beside ours
 - `agreement.py`: the reference against Monte Carlo, the verdict, and the table of trust
-- `kernels.py`: costs, levels and orders of kernels
-- `scaling.py`: what methods cost as their work grows, and exponents
+- `costs.py`: what kernels cost, where they break, what methods cost as their work grows
 """

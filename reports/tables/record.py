@@ -6,6 +6,9 @@ status 1 where it did not pass.
 """
 
 import base64
+import os
+import shutil
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -14,6 +17,34 @@ from typing import Any
 from reports.tables.drawing import html, sentence_in_html, sentence_in_text, text
 from reports.tables.table import Column, Table
 from reports.tables.table import table as make_table
+
+
+def colours_wanted() -> bool:
+    """Return whether colours and bold letters may be printed: NO_COLOR is not set, or empty (https://no-color.org)."""
+    return not os.environ.get("NO_COLOR")
+
+
+def terminal_width() -> int | None:
+    """Return how wide the terminal is that is printed to [characters]; None where it is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+
+
+def print_json(data: Any) -> None:
+    """Print data as JSON; a number that is not finite is refused: what has none is None."""
+    import json
+
+    try:
+        text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+    except ValueError:
+        from analytic.errors import InputError
+
+        raise InputError("a result is not finite, and is not printed; a number of the input may be too large") from None
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        text = json.dumps(data, indent=2, allow_nan=False)
+    print(text)
+
 
 #: Pictures narrower than this are enlarged by a whole factor, so that single pixels can be seen [CSS pixels].
 _NARROW = 240

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene that changes from frame to frame, and no more than that is made again.
+"""A scene that changes from frame to frame, and no more than that is made again; its stages timed one by one.
 
 Camera, lights and media are opaque arrays, so their changes record nothing. A configuration has its own recorded
 functions: they are kept for the last few, and configurations share those that cast and shade, which know nothing of a
@@ -8,7 +8,7 @@ method but whether it finds out which surfaces are lit. What the camera rays mee
 
 import time
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,15 +17,48 @@ import drjit as dr
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.incremental import FrameCache, next_frame
-from realtime.frame.renderer import Frame, FrameRenderer, image_frame
+from realtime.frame.renderer import Frame, FrameRenderer, Stages, image_frame
 from realtime.methods.registry import find_method
 from realtime.methods.shader.method import Shader
 from realtime.parameters import defaults
 from realtime.scene.read_scene import read_again, read_scene
-from reports.view.stages import timed_stages
 from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
 from validation.scenes.loading import load_scene
 from validation.study.configuration import Configuration, configuration, prepared
+
+#: The `Stages` of a frame, in their order, and what the page calls them.
+WORDS = {
+    "prepare": "shadow maps or planes",
+    "surface": "camera rays and surface",
+    "shade": "surface, rays cached",
+    "render": "airlight",
+}
+
+
+def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, float]]:
+    """Return a renderer that does the same, and a dictionary that its next frame fills with the time of stages [ms]."""
+    times: dict[str, float] = {}
+
+    def clocked(stages: Stages) -> Stages:
+        timed: dict[str, Any] = {name: _clocked(name, getattr(stages, name), times) for name in WORDS}
+        return replace(stages, **timed)
+
+    return replace(renderer, structures={key: clocked(stages) for key, stages in renderer.structures.items()}), times
+
+
+def _clocked(name: str, stage: Callable[..., Any], times: dict[str, float]) -> Callable[..., Any]:
+    def clocked(*arguments):
+        dr.sync_thread()
+        begin = time.perf_counter()
+        result = stage(*arguments)
+        if name != "prepare":  # whose states need not be arrays alone
+            dr.eval(result)
+        dr.sync_thread()
+        times[name] = times.get(name, 0.0) + 1e3 * (time.perf_counter() - begin)
+        return result
+
+    return clocked
+
 
 _KEPT = 6  # configurations of which the recorded functions are kept
 

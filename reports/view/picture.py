@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.numerics.recorded import Frozen
-from reports.plotting.colour_maps import NOT_FINITE
-from reports.plotting.pictures import tone_mapped
+from reports.plotting.pictures import NOT_FINITE, tone_mapped
 
 LAYERS = {"total": (1.0, 1.0), "airlight": (1.0, 0.0), "surface": (0.0, 1.0)}  #: weights of airlight and surface
 _BRIGHTEST = 8.0  # times white: the table ends here

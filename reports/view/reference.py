@@ -1,16 +1,209 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The reference of what is shown, computed by another process while nothing moves."""
+"""The reference of what is shown: in which order its pixels come, and the process that computes it.
 
+Pixels of a coarse grid come first, then those of grids of half its step. Within a grid the order is random, so that
+what is known is a fair sample of the image at any time, and the picture of it grows sharper. The process yields the
+processor to the view. A new task ends the one before it, at the next of its chunks; the process ends with the other end
+of its pipe, however the view has ended.
+"""
+
+import os
 import sys
 import threading
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from types import ModuleType
+from typing import Any
 
-from reports.view.reference_order import KnownReference
-from reports.view.reference_process import Answer, Task, compute
+import numpy as np
+from numpy.typing import NDArray
+
+from validation.metrics.errors import error_metrics
 from validation.scenes.changes import Values
+
+Array = NDArray[np.float64]
+STEPS = (16, 8, 4, 2, 1)
+
+
+def pixel_order(width: int, height: int) -> NDArray[np.int64]:
+    """Return the numbers of all pixels in their order, (pixels,)."""
+    row, column = np.divmod(np.arange(width * height), width)
+    level = np.full(width * height, len(STEPS) - 1)
+    for number, step in reversed(list(enumerate(STEPS))):
+        level[(row % step == 0) & (column % step == 0)] = number
+    return np.lexsort([np.random.default_rng(0).random(width * height), level])
+
+
+@dataclass(frozen=True)
+class KnownReference:
+    """What is known of the reference of an image; what is not is NaN."""
+
+    airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
+    surface: Array  #: [W/(m^2 sr)]
+    bound: Array  #: of the error of the airlight; with area lights, and twice its standard error [W/(m^2 sr)]
+
+    @staticmethod
+    def of_size(width: int, height: int) -> "KnownReference":
+        """Return what is known before there is anything."""
+        return KnownReference(*(np.full((height, width, 3), np.nan) for _ in range(3)))
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which pixels are known, (height, width)."""
+        return np.isfinite(self.airlight[..., 0])
+
+    def add(self, pixels: NDArray[np.int64], airlight: Array, surface: Array, bound: Array) -> None:
+        """Note the reference of some pixels, (pixels, 3) each."""
+        for layer, values in ((self.airlight, airlight), (self.surface, surface), (self.bound, bound)):
+            layer.reshape(-1, 3)[pixels] = values
+
+    def filled(self, layer: Array) -> Array:
+        """Return a layer of the reference, or of a frame; pixels that are not known take a near one that is."""
+        known = self.known
+        step = next((step for step in reversed(STEPS) if known[::step, ::step].all()), None)
+        if step is None:
+            return np.where(known[..., None], layer, 0)
+        rows, columns = (np.arange(size) // step * step for size in known.shape)
+        return np.where(known[..., None], layer, layer[np.ix_(rows, columns)])
+
+
+@dataclass(frozen=True)
+class ViewError:
+    """The error of the airlight of a frame against what is known of its reference, over the mean of that."""
+
+    relative_rmse: float | None
+    interval: float | None  #: half of the 95 % interval of that, for the pixels that are not known yet
+    relative_bias: float | None
+    p99: float | None  #: see `validation.metrics.errors`
+    bound: float | None  #: root mean square of the reference's own bound: the most by which it changes the error
+    known: int  #: pixels
+    pixels: int
+
+
+def view_error(found: KnownReference, airlight: Array) -> ViewError | None:
+    """Return the error of the airlight of a frame, (height, width, 3) [W/(m^2 sr)]; None if nothing is known."""
+    known = found.known
+    count, pixels = int(known.sum()), known.size
+    if count == 0:
+        return None
+    reference, test = found.airlight[known], np.asarray(airlight, dtype=np.float64)[known]
+    metrics = error_metrics(reference[None], test[None])
+    mean = float(reference.mean())
+    square = np.mean((test - reference) ** 2, axis=1)
+    spread = float(square.std()) / np.sqrt(count) * np.sqrt(1 - count / pixels)
+    rmse = float(np.sqrt(square.mean()))
+    interval = 1.96 * spread / (2 * rmse) if rmse > 0 else 0.0
+    bound = float(np.sqrt(np.mean(found.bound[known] ** 2)))
+    return ViewError(
+        metrics.relative_rmse,
+        interval / mean if mean > 0 else None,
+        metrics.relative_bias,
+        metrics.p99,
+        bound / mean if mean > 0 else None,
+        count,
+        pixels,
+    )
+
+
+def motion_error(errors: Sequence[ViewError]) -> tuple[float, float]:
+    """Return the root mean square of the errors of frames, and half of its 95 % interval for the pixels left out."""
+    rmse, halves = (np.array([getattr(each, name) for each in errors]) for name in ("relative_rmse", "interval"))
+    mean = float(np.sqrt(np.mean(rmse**2)))
+    return mean, float(np.linalg.norm(rmse * halves)) / (len(errors) * mean) if mean > 0 else 0.0
+
+
+_CHUNK = 0.25  # approximate time for the rays between two looks for a new task [s]
+_FIRST, _MOST = 256, 20000  # rays
+
+
+@dataclass(frozen=True)
+class Task:
+    """A reference to compute."""
+
+    number: int
+    scene: str  #: name or path
+    size: tuple[int, int]  #: [pixels]
+    changes: dict[str, Values]  #: `validation.scenes.changes`
+    most: int | None = None  #: pixels, by chance; None: all, in their order
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was found for a task: rays, the end, or why there is no reference."""
+
+    task: int
+    pixels: Any = None  #: numbers of pixels, (rays,)
+    airlight: Any = None  #: (rays, 3) [W/(m^2 sr)]
+    surface: Any = None  #: (rays, 3) [W/(m^2 sr)]
+    bound: Any = None  #: of the error of the airlight, and twice its standard error, (rays, 3) [W/(m^2 sr)]
+    done: bool = False
+    failure: str = ""
+
+
+def yield_processor() -> None:
+    """Let this process run only when nothing else wants to, where the system knows that, else seldom."""
+    with suppress(OSError, AttributeError):
+        os.nice(19)
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
+def answers(task: Task) -> Iterator[Answer]:
+    """Yield the reference of an image, rays after rays."""
+    from reports.view.reference import pixel_order
+    from validation.estimates.quadrature import reference_error, reference_of_pixels
+    from validation.scenes.loading import load_scene
+
+    scene = load_scene(task.scene, task.size, task.changes).scene
+    order = pixel_order(*task.size)
+    if task.most is not None:  # others for each frame
+        order = np.random.default_rng(task.number).permutation(order)[: task.most]
+    begin, rays = 0, _FIRST
+    while begin < len(order):
+        chosen = order[begin : begin + rays]
+        start = time.perf_counter()
+        found = reference_of_pixels(scene, chosen)
+        taken = time.perf_counter() - start
+        begin += len(chosen)
+        rays = int(np.clip(rays * np.clip(_CHUNK / max(taken, 1e-3), 0.25, 2), 16, _MOST))
+        # The lights that the camera sees are left out: the frames beside this show none.
+        layers = found.airlight, found.surface, found.airlight_bound
+        airlight, surface, bound = (layer.reshape(-1, 3) for layer in layers)
+        error = reference_error(found, "airlight")
+        if error is not None:
+            bound = bound + 2 * error.reshape(-1, 3)
+        yield Answer(task.number, chosen, airlight, surface, bound)
+    yield Answer(task.number, done=True)
+
+
+def compute(pipe: Connection, variant: str) -> None:
+    """Answer the tasks of a pipe, the newest first and alone; None for nothing to do."""
+    from analytic.errors import InputError
+    from reports.machine.environment import activate
+    from reports.machine.process_start import default_signals
+
+    default_signals()
+    with suppress(OSError, AttributeError):
+        os.setsid()  # Ctrl-C reaches the view alone, which ends this
+    os.dup2(2, 1)  # what is printed
+    yield_processor()
+    activate(variant)
+    with suppress(EOFError, OSError):  # the view has ended
+        while True:
+            task: Task | None = pipe.recv()
+            while pipe.poll():
+                task = pipe.recv()
+            try:
+                for answer in () if task is None else answers(task):
+                    if pipe.poll():
+                        break
+                    pipe.send(answer)
+            except InputError as error:
+                pipe.send(Answer(task.number if task else 0, failure=" ".join(str(error).split())))
 
 
 class ReferenceInBackground:

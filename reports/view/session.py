@@ -24,14 +24,12 @@ from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import METHODS, find_method
 from realtime.parameters import defaults, values
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
-from reports.view.live_scene import LiveScene, Shown
+from reports.view.live_scene import WORDS, LiveScene, Shown
 from reports.view.picture import LAYERS, Pictures, rgba
-from reports.view.reference import ReferenceInBackground
-from reports.view.reference_order import ViewError, motion_error, view_error
+from reports.view.reference import ReferenceInBackground, ViewError, motion_error, view_error
 from reports.view.server import Page
-from reports.view.stages import WORDS
-from reports.view.state import ViewState
 from reports.view.widgets import (
+    ViewState,
     calls_kernel,
     kernel_widgets,
     method_widgets,

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page can change, as data for its widgets: all of it follows from typed records, nothing is listed here."""
+"""What the page can change, as data for its widgets, and the commands that show or render it again.
 
-from dataclasses import Field, fields
+All of it follows from typed records, nothing is listed here. What the page is sent is JSON, made of dictionaries here.
+"""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
 from realtime.area_lights.points import LightSamples
@@ -9,8 +14,31 @@ from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import METHODS, find_method
 from realtime.parameters import limits_of
-from validation.scenes.changes import Changeable
+from validation.scenes.changes import Changeable, Values, change_words
 from validation.study.configuration import Configuration
+
+
+@dataclass(frozen=True)
+class ViewState:
+    """A scene, what of it was changed, and the configuration that renders it."""
+
+    scene: str  #: name or path, as the user gave it
+    size: tuple[int, int]  #: of the image [pixels]
+    chosen: Configuration
+    changes: Mapping[str, Values] = field(default_factory=dict)  #: `validation.scenes.changes`
+
+    def command(self, name: str) -> str:
+        """Return the line to type that shows this: `name` is 'view', 'render' or 'reference'."""
+        words = ["airlight", name, self.scene]
+        if name != "reference":
+            words += ["--method", self.chosen.method]
+            words += ["--set", f"kernel={self.chosen.kernel}"] if self.chosen.kernel else []
+            for parameter, value in self.chosen.parameters:
+                words += ["--set", f"{parameter}={value}"]
+        for word in change_words(self.changes):
+            words += ["--change", word]
+        words += ["--size", f"{self.size[0]}x{self.size[1]}"]
+        return shlex.join(words)
 
 
 def method_widgets(own: str) -> list[dict[str, Any]]:

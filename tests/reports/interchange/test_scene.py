@@ -14,8 +14,8 @@ from reference.quadrature.height_fog import fog_of
 from reference.scene.read import read_reference
 from reports.commands.main import run
 from reports.interchange.fog_grid import fog_grid, write_fog_grid
-from reports.interchange.folder import describe_folder
 from reports.interchange.scene import describe_scene, spot_power_angle
+from reports.interchange.words import describe_folder
 from tests.helpers.area_lights import lamp
 from tests.helpers.height_fog import LAMP, fog_xml
 from tests.helpers.scenes import bounded_medium, scene_xml, spot, tiny_scene

@@ -118,7 +118,7 @@ def test_a_file_does_not_take_the_place_of_a_closed_output(tmp_path):
 def test_json_loses_nothing_in_ascii():
     code = "from reports.machine.process_start import usable_streams; usable_streams()\n"
     code += "print('\\u2500')\n"
-    code += "from reports.tables.terminal import print_json; print_json({'name': '\\u2500 \\udcff'})"
+    code += "from reports.tables.record import print_json; print_json({'name': '\\u2500 \\udcff'})"
     ran = run(f'cd {ROOT}; {sys.executable} -c "{code}"', PYTHONIOENCODING="ascii")
     shown, _, printed = ran.stdout.partition(b"\n")
     assert shown == b"?"

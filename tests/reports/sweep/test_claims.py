@@ -7,11 +7,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from analytic.errors import InputError
-from reports.sweep.claims import claim
-from reports.sweep.correlations import correlations, strongest, sure
+from reports.sweep.claims import claim, correlations, strongest, sure
 from reports.sweep.faults import checks, faults, reasons
-from reports.sweep.read import FILE, read_sweep
-from reports.sweep.samples import Fastest, fastest_within, samples
+from reports.sweep.samples import FILE, Fastest, fastest_within, read_sweep, samples
 from tests.helpers.sweeps import row, rows, write_rows
 from validation.statistics.samples import binomial_interval
 

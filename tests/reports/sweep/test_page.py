@@ -11,7 +11,7 @@ from reports.commands.main import run
 from reports.page.chart import svg_text
 from reports.sweep.figures import drawn
 from reports.sweep.page import render_sweep, write_sweep
-from reports.sweep.read import FILE, read_sweep
+from reports.sweep.samples import FILE, read_sweep
 from reports.sweep.summary import summary_of, to_json
 from tests.helpers.page import Page
 from tests.helpers.sweeps import METHODS, faulty_rows, row, rows, write_rows

@@ -8,9 +8,9 @@ import pytest
 
 from reports.data.records import MethodRow, Scene
 from reports.tables.agreement import verdict
+from reports.tables.costs import cliffs, scaling_tables
 from reports.tables.drawing import csv, html, latex, markdown, text
 from reports.tables.methods import COLUMNS, TIMES, fastest_table, methods_table
-from reports.tables.scaling import cliffs, scaling_tables
 from tests.helpers.reports import agreement, errors, growth_record, record_of, scene
 from tests.helpers.reports import entry as made
 from validation.statistics.records import Agreement

@@ -8,11 +8,10 @@ import pytest
 
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
-from reports.plotting.colour_maps import NOT_FINITE
-from reports.plotting.pictures import tone_mapped
+from reports.plotting.pictures import NOT_FINITE, tone_mapped
 from reports.view.live_scene import LiveScene
 from reports.view.picture import LAYERS, Pictures
-from reports.view.reference_order import KnownReference, view_error
+from reports.view.reference import KnownReference, view_error
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene
 from validation.study.configuration import configuration, prepared

@@ -14,10 +14,9 @@ import pytest
 
 from reference.storage.exr import read_exr
 from reports.commands import main as cli
-from reports.view.reference_order import KnownReference
-from reports.view.reference_process import Task, answers
+from reports.view.reference import KnownReference, Task, answers
 from reports.view.session import Session
-from reports.view.state import ViewState
+from reports.view.widgets import ViewState
 from tests.helpers.shaders import need_opengl
 from validation.study.configuration import configuration
 

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Studies of errors that vary: from run to run, from frame to frame under a light that moves, from ray to ray."""
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
+
+from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, pixels_of, telling, with_kernels
+from reports.machine.progress import counted
+from reports.studies.registry import FRACTION, Study, with_environment
+from reports.tables.table import Interval, numbers, table, table_of, words
+
+if TYPE_CHECKING:
+    from validation.estimates.transmittance import TransmittanceError
+    from validation.study.motion import MethodMotion
+    from validation.study.noise import MethodNoise
+
+
+_GOAL = 0.01  # error, until which the time is given
+_MOST = 1e5  # runs that are averaged in the figure
+
+
+@with_kernels
+def noise(
+    scene: SceneLike = "sphere-spot",
+    *,
+    runs: int = 16,
+    method: Methods = (),
+    kernel: Kernels = (),
+    settings: Values = (),
+    size: Size = (160, 120),
+    progress: Progress = None,
+) -> Study:
+    """Measure bias and noise of methods that draw random numbers, by independent runs of one frame.
+
+    The reference has no noise. Methods that draw no random numbers stand in the same table: all of their error is bias.
+    See docs/your-engine.md for what the numbers are; `airlight compare SCENE "runs/####.exr"` has the same for renders
+    of others.
+
+    Parameters
+    ----------
+    scene
+        A built-in scene, random:SEED or a Mitsuba XML file.
+    runs
+        Of each method that draws random numbers.
+    method, kernel, settings
+        As in `airlight study methods`.
+    size
+        Width and height [pixels], or WxH.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from reports.api.render import asked_configurations
+    from reports.api.scenes import opened
+    from validation.columns import plain
+    from validation.motion.noise import BLURS, time_words
+    from validation.study.configuration import named_configurations
+    from validation.study.noise import method_noise
+
+    chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("noise"))
+    loaded = opened(scene, pixels_of(size))
+    with telling(progress, "noise") as tell:
+        found = method_noise(loaded.scene, chosen, runs=runs, progress=counted(tell))
+    middle = len(BLURS) // 2
+    rows = [{"label": each.label, **plain(each.noise.to_json())} for each in found]
+    shown = [
+        row
+        | {
+            "ms": 1e3 * (each.noise.seconds or 0.0),
+            "interval": Interval(*each.noise.bias_ci) if each.noise.runs > 1 else None,
+            "noise": math.sqrt(max(each.noise.variance.value or 0.0, 0.0)),
+            "until": time_words(each.noise.seconds_to(_GOAL)),
+            "blurred": each.noise.blurred_rmse[middle],
+        }
+        for row, each in zip(rows, found, strict=True)
+    ]
+    columns = (
+        *words(label="method"),
+        *numbers("runs", ms="frame [ms]"),
+        *numbers(bias="bias", interval="95 %", detectable_bias="detectable", how=FRACTION),
+        *numbers(root_bias="bias by pixel", noise="noise", relative_rmse="rel. RMSE", how=FRACTION),
+        *numbers(efficiency="efficiency [1/s]"),
+        *words(until=f"to {100 * _GOAL:g} %"),
+        *numbers(low_fraction="low frequencies", how={"digits": 2}),
+        *numbers(blurred=f"RMSE blurred, {BLURS[middle]:g} px", how=FRACTION),
+    )
+    title = f"{loaded.name}: errors of one frame, relative to the mean of the reference"
+    data = with_environment(scene=loaded.name, runs=runs, rows=rows)
+    return Study(
+        name="noise",
+        data=data,
+        tables=(table(title, columns, shown),),
+        lines=tuple(f"{each.label}: {each.noise.words}" for each in found),
+        rows=tuple(rows),
+        draw=partial(_draw_noise, found),
+    )
+
+
+def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
+    """Return error against time, error spectra, and of each noisy method what is biased and how noisy it is."""
+    from reports.plotting.figure import new_figure
+    from reports.plotting.pictures import error_map
+    from reports.plotting.style import WIDTHS
+
+    width, noisy = WIDTHS[column], [each for each in found if each.noise.runs > 1]
+    figure = new_figure(width, (0.42 + 0.38 * len(noisy)) * width)
+    panels = figure.subplots(1 + len(noisy), 2, squeeze=False)
+    errors, spectra = panels[0]
+    for each in found:
+        seconds = each.noise.seconds or 0.0
+        steps = [10 ** (k / 8) for k in range(1 + round(8 * math.log10(_MOST)) if each.noise.runs > 1 else 1)]
+        style = {} if each.noise.runs > 1 else {"marker": "o", "linestyle": ""}
+        errors.plot([seconds * n for n in steps], [each.noise.after(n) for n in steps], label=each.label, **style)
+        rings = len(each.noise.spectrum)
+        spectra.plot([(k + 0.5) / (2 * rings) for k in range(rings)], each.noise.spectrum, label=each.label)
+    errors.set(xlabel="time [s]", ylabel="relative RMSE of averaged runs [1]", xscale="log", yscale="log")
+    errors.legend(loc="best")
+    spectra.axhline(1.0, color="0.5", linestyle=":")  # white noise
+    spectra.set(xlabel="frequency [cycles/pixel]", ylabel="error spectrum [1]")
+    for (bias, deviation), each in zip(panels[1:], noisy, strict=True):
+        bias.imshow(error_map(each.reference, each.mean), interpolation="nearest")
+        bias.set_title("mean of the runs, from two standard errors on", fontsize="small")
+        shown = deviation.imshow(each.deviation.mean(axis=2) / each.reference.mean(), interpolation="nearest")
+        deviation.set_title("standard deviation of a run", fontsize="small")
+        figure.colorbar(shown, ax=deviation)
+        bias.set_ylabel(each.label, fontsize="small")
+        for panel in (bias, deviation):
+            panel.set(xticks=[], yticks=[])
+    return figure
+
+
+_TURN = 120  # frames of a whole turn in a sweep
+_RUNS = 4  # of a method that draws random numbers
+
+
+@with_kernels
+def motion(
+    scene: SceneLike = "sphere-spot",
+    *,
+    stimulus: Literal["sweep", "step"] = "sweep",
+    frames: int = 24,
+    method: Methods = (),
+    kernel: Kernels = (),
+    settings: Values = (),
+    size: Size = (160, 120),
+    progress: Progress = None,
+) -> Study:
+    """Measure how methods flicker, lag and leave ghosts under a light that moves.
+
+    Each frame is compared with its own reference. A method that keeps history gets it. See docs/your-engine.md for what
+    the numbers are; `airlight compare --frames` has the same for frames of other renderers.
+
+    Parameters
+    ----------
+    scene
+        A scene whose lights have no extent.
+    stimulus
+        Lights that circle, 120 frames a turn (sweep), or that jump after eight frames (step).
+    frames
+        How many are rendered.
+    method, kernel, settings
+        As in `airlight study methods`; planes, froxels with and without history, a noisy march with it, by default.
+    size
+        Width and height [pixels], or WxH.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from reports.api.render import asked_configurations
+    from reports.api.scenes import opened
+    from validation.study.configuration import named_configurations
+    from validation.study.motion import method_motion
+
+    chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("motion"))
+    loaded = opened(scene, pixels_of(size))
+    with telling(progress, "motion") as tell:
+        found = method_motion(
+            loaded.scene,
+            loaded.animation,
+            chosen,
+            stimulus=stimulus,
+            frames=frames,
+            turn=_TURN,
+            runs=_RUNS,
+            progress=counted(tell),
+        )
+    columns = (
+        *words(label="method"),
+        *numbers(relative_rmse="rel. RMSE", bias="bias", flicker="flicker", how=FRACTION),
+        *numbers(lag="lag", lag_se="its error", ghost="ghost", ghost_se="its error", pop="pop"),
+        *words("verdict"),
+    )
+    rows = [each.to_json() for each in found]
+    title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
+    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=rows)
+    return Study(
+        name="motion",
+        data=data,
+        tables=(table(title, columns, rows),),
+        rows=tuple(rows),
+        draw=partial(_draw_motion, found),
+    )
+
+
+def _draw_motion(found: "list[MethodMotion]", column: str) -> Any:
+    """Return the error by frame of each method."""
+    from reports.plotting.figure import new_figure
+    from reports.plotting.style import WIDTHS
+
+    width = WIDTHS[column]
+    figure = new_figure(width, 0.62 * width)
+    axes = figure.subplots()
+    measured = [(each.label, each.measures) for each in found if each.measures]
+    for label, measures in measured:
+        axes.plot(measures.rmse_by_frame, label=label)
+    change = measured[0][1].change_by_frame if measured else ()
+    axes.plot(change, color="0.5", linestyle=":", label="change of the reference")
+    axes.set(xlabel="frame", ylabel="relative RMSE [1]")
+    axes.set_yscale("symlog", linthresh=1e-6)
+    axes.legend(loc="best")
+    return figure
+
+
+_STEPS = (2, 4, 8, 16, 32)  # of the marches
+_STYLES = {
+    "naive": ("vermillion", "o"),
+    "jackknife": ("green", "^"),
+    "unbiased-ray-marching": ("blue", "s"),
+    "ratio-tracking": ("purple", "D"),
+}
+
+
+@with_kernels
+def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> Study:
+    """Measure estimators of the transmittance of rays through a density grid.
+
+    Naive exponentials of a marched sum are too bright, by Jensen's inequality: the row says by how much, and how much
+    follows from the variance of the sum. Beside them stand ratio tracking, unbiased ray marching and the jackknife, all
+    against the exact optical depth, over 48 rays between random places of the grid.
+
+    Parameters
+    ----------
+    scene
+        A scene with a density grid around its camera.
+    progress
+        Called with (fraction done, what); True shows a bar.
+    """
+    from reference.scene.read import read_reference
+    from reports.api.scenes import opened
+    from validation.columns import shown_values
+    from validation.estimates.transmittance import TransmittanceError, transmittance_errors
+
+    with telling(progress, "rays") as tell:
+        read = read_reference(opened(scene, (8, 6)).scene)
+        rows = transmittance_errors(read, _STEPS, progress=tell)
+    title = f"{scene}: transmittance of 48 rays, relative to its mean"
+    data = with_environment(scene=str(scene), rows=rows)
+    how = dict.fromkeys(("bias", "bias_error", "jensen", "spread"), FRACTION)
+    drawn = table_of(title, TransmittanceError, rows, how=how)
+    return Study(
+        name="transmittance",
+        data=data,
+        tables=(drawn,),
+        rows=tuple(map(shown_values, rows)),
+        draw=partial(_draw_transmittance, rows),
+    )
+
+
+def _draw_transmittance(rows: "list[TransmittanceError]", column: str) -> Any:
+    """Return bias and spread over the look-ups; dotted, the brightening that Jensen's inequality predicts."""
+    from reports.plotting.figure import name_sizes, new_figure
+    from reports.plotting.style import COLOURS, WIDTHS
+
+    width, double = WIDTHS[column], column == "double"
+    figure = new_figure(width, (0.42 if double else 1.4) * width)
+    panels = figure.subplots(1, 2) if double else figure.subplots(2, 1)
+    for name, (colour, marker) in _STYLES.items():
+        own = [row for row in rows if row.estimator == name]
+        look_ups = [row.look_ups for row in own]
+        style: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "label": name}
+        panels[0].errorbar(look_ups, [abs(row.bias) for row in own], [2 * row.bias_error for row in own], **style)
+        panels[1].plot(look_ups, [row.spread for row in own], **style)
+    march = [row for row in rows if row.jensen is not None]
+    jensen = [row.look_ups for row in march], [row.jensen for row in march]
+    panels[0].plot(*jensen, color=COLOURS["vermillion"], linestyle=":", label="naive, by Jensen")
+    panels[0].set(ylabel="bias, absolute, relative to T [1]")
+    panels[1].set(ylabel="standard deviation, relative to T [1]")
+    for panel in panels:
+        panel.set(xlabel="look-ups a ray [1]", xscale="log", yscale="log")
+        name_sizes(panel, sorted({row.steps for row in march}))
+    panels[0].legend(loc="best")
+    return figure
