@@ -9,20 +9,16 @@ that crashes.
 prints Debian's names of the packages that are missing, for the launcher.
 """
 
-import json
-import signal
-import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from reports.machine.environment import (
     MissingError,
     atomic_problem,
-    child_environment,
     missing_packages,
     prepare,
     processor,
@@ -32,59 +28,108 @@ from reports.machine.environment import (
 from reports.machine.gpu import cuda_status, optix_status
 from reports.machine.llvm import find_llvm
 from reports.machine.opengl import opengl_status
+from reports.machine.own_process import EndedError, in_own_process
 from reports.tables.record import Result
 from reports.tables.table import Table, table, words
 
 _PATIENCE = 180.0  # seconds for the first kernel; the first one on a GPU compiles OptiX's own
 
 
+@dataclass(frozen=True)
+class Kernel:
+    """What the test kernel found."""
+
+    variant: str
+    threads: int
+    library: str | None  #: the libLLVM that was really loaded, where the system tells
+    epsilon: float  #: of shadow rays, relative
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Check:
+    """Whether a part works; None for a fact."""
+
+    what: str
+    works: bool | None
+    details: str
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Whether kernels run here."""
+
+    works: bool
+    problem: str | None  #: what is wrong and what to do
+    variant: str | None  #: that was chosen
+    kernel: Kernel | None
+    checks: tuple[Check, ...]
+
+
+@dataclass(frozen=True)
+class Files:
+    """How much is cached of a kind."""
+
+    files: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Cache:
+    """How much is cached."""
+
+    folder: str
+    limit: int
+    files: int
+    bytes: int
+    kinds: Mapping[str, Files]
+    removed: int | None = None  #: files, where the cache was to be cleared
+    freed: int | None = None  #: bytes
+
+
 @dataclass(frozen=True, repr=False)
 class Doctor(Result):
     """What works on this machine, and what is cached."""
 
-    machine: Mapping[str, Any]  #: as `airlight doctor --json` prints it, without the cache
-    cache: Mapping[str, Any]
+    machine: Machine
+    cache: Cache
 
     @property
     def works(self) -> bool:
         """Whether kernels run here."""
-        return bool(self.machine["works"])
+        return self.machine.works
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight doctor --json` prints."""
-        return {**self.machine, "cache": dict(self.cache)}
+        return asdict(self.machine) | {"cache": asdict(self.cache)}
 
     @property
     def tables(self) -> Sequence[Table]:
         """What works, with details."""
-        return [table("", words("what", "works", "details"), self.machine["checks"])]
+        return [table("", words("what", "works", "details"), map(vars, self.machine.checks))]
 
     @property
     def lines(self) -> Sequence[str]:
         """The cache, and the verdict."""
         cache = self.cache
-        size = f"{_size(cache['bytes'])} of at most {_size(cache['limit'])}"
-        lines = [f"cache {cache['folder']}: {cache['files']} files, {size}"]
-        lines += [f"  {kind}: {of['files']} files, {_size(of['bytes'])}" for kind, of in cache["kinds"].items()]
-        if "removed" in cache:
-            lines.append(f"  {cache['removed']} files removed, {_size(cache['freed'])} freed")
+        lines = [f"cache {cache.folder}: {cache.files} files, {_size(cache.bytes)} of at most {_size(cache.limit)}"]
+        lines += [f"  {kind}: {of.files} files, {_size(of.bytes)}" for kind, of in cache.kinds.items()]
+        if cache.freed is not None:
+            lines.append(f"  {cache.removed} files removed, {_size(cache.freed)} freed")
         ready = "Everything that airlight needs works."
-        return [*lines, ready if self.works else f"Not ready: {self.machine['problem']}"]
-
-    @property
-    def passed(self) -> bool:
-        """Whether all files went, if the cache was to be cleared; the command has a status of its own for `works`."""
-        return "removed" not in self.cache or not self.cache["files"]
+        return [*lines, ready if self.works else f"Not ready: {self.machine.problem}"]
 
     @property
     def status(self) -> int:
-        """The exit status: 3 where no kernel can be run."""
-        return super().status if self.works else 3
+        """The exit status: 3 where no kernel can be run, 1 where the cache was to be cleared and files are left."""
+        if not self.works:
+            return 3
+        return int(self.cache.removed is not None and self.cache.files > 0)
 
     @property
     def title(self) -> str:
         """Whether it works."""
-        return "ready" if self.works else str(self.machine["problem"])
+        return self.machine.problem or "ready"
 
 
 def doctor(*, clear_cache: bool = False) -> Doctor:
@@ -112,26 +157,19 @@ def doctor(*, clear_cache: bool = False) -> Doctor:
     return Doctor(diagnose(), cache)
 
 
-def _cache(*, clear: bool) -> dict[str, Any]:
-    """Return how much is cached, by kind, after everything is removed where that is asked for."""
+def _cache(*, clear: bool) -> Cache:
+    """Return how much is cached, after everything is removed where that is asked for."""
     from analytic.errors import InputError
     from reference.storage.cache import cache_entries, cache_folder, cache_limit, clear_cache
 
     folder = cache_folder()
     if folder.exists() and not folder.is_dir():
         raise InputError(f"the cache {folder} is not a folder; remove it, or name another by AIRLIGHT_CACHE_DIR")
-    removed = clear_cache() if clear else None
+    removed = clear_cache() if clear else (None, None)
     entries = cache_entries()
-    kinds = sorted({entry.kind for entry in entries})
-    sizes = {kind: [entry.size for entry in entries if entry.kind == kind] for kind in kinds}
-    data = {
-        "folder": str(folder),
-        "limit": cache_limit(),
-        "files": len(entries),
-        "bytes": sum(entry.size for entry in entries),
-        "kinds": {kind: {"files": len(each), "bytes": sum(each)} for kind, each in sizes.items()},
-    }
-    return data | ({"removed": removed[0], "freed": removed[1]} if removed is not None else {})
+    sizes = {kind: [each.size for each in entries if each.kind == kind] for kind in sorted({e.kind for e in entries})}
+    kinds = {kind: Files(len(each), sum(each)) for kind, each in sizes.items()}
+    return Cache(str(folder), cache_limit(), len(entries), sum(each.size for each in entries), kinds, *removed)
 
 
 def _size(size: float) -> str:
@@ -143,75 +181,50 @@ def _size(size: float) -> str:
     return f"{size:.0f} {units[0]}" if size >= 100 or units[0] == "bytes" else f"{size:.3g} {units[0]}"
 
 
-def diagnose() -> dict[str, Any]:
-    """Examine this machine, ready for JSON.
-
-    ``works`` says whether kernels run here, ``problem`` what is wrong and what to do (None if nothing), ``variant``
-    what was chosen, ``kernel`` what the test kernel found (the libLLVM that it really loaded, its threads and the
-    shadow-ray epsilon), and ``checks`` of each part whether it works, and details.
-    """
+def diagnose() -> Machine:
+    """Examine this machine."""
     import platform
-
-    checks: list[dict[str, Any]] = []
-
-    def check(what: str, works: bool | None, details: str) -> None:
-        checks.append({"what": what, "works": works, "details": details})
 
     variant, used, problem, kernel = None, None, None, None
     try:
         prepared = prepare()
         variant, used = prepared.variant, prepared.llvm.path if prepared.llvm else None
         kernel = try_kernel(variant)
-        problem = kernel.pop("problem", None)
-    except MissingError as error:
+    except (MissingError, EndedError) as error:
         problem = str(error)
-    check("platform", None, f"{platform.platform()}, {processor()}, {threads()} threads")
+    checks = [Check("platform", None, f"{platform.platform()}, {processor()}, {threads()} threads")]
     for name, version in versions().items():
-        check(name, version != "missing", f"{version}, {sys.executable}" if name == "python" else version)
+        details = f"{version}, {sys.executable}" if name == "python" else version
+        checks.append(Check(name, version != "missing", details))
     libraries = find_llvm()
     for llvm in libraries:
-        check(llvm.label, llvm.works, f"{llvm.path}: {llvm.reason}{', used' if llvm.path == used else ''}")
-    if not libraries:
-        check("LLVM", False, "none found")
+        details = f"{llvm.path}: {llvm.reason}{', used' if llvm.path == used else ''}"
+        checks.append(Check(llvm.label, llvm.works, details))
+    checks += [] if libraries else [Check("LLVM", False, "none found")]
     atomic = atomic_problem()
-    check("libatomic.so.1", not atomic, atomic or "can be loaded")
-    for name, status in (("CUDA", cuda_status()), ("OptiX", optix_status())):
-        check(name, status.works, status.reason)
+    checks.append(Check("libatomic.so.1", not atomic, atomic or "can be loaded"))
     opengl = opengl_status(judged=problem is None)
-    check("OpenGL", opengl.works, opengl.reason)
-    check("variant", variant is not None, variant or "none works")
+    for name, status in (("CUDA", cuda_status()), ("OptiX", optix_status()), ("OpenGL", opengl)):
+        checks.append(Check(name, status.works, status.reason))
+    checks.append(Check("variant", variant is not None, variant or "none works"))
     if kernel:
-        loaded = f"; loaded {kernel['library']}" if kernel["library"] else ""
-        check("test kernel", True, f"ran in {kernel['seconds']:.1f} s on {kernel['threads']} threads{loaded}")
-        check("shadow-ray epsilon", None, f"{kernel['epsilon']:.4g}, relative; measured")
+        loaded = f"; loaded {kernel.library}" if kernel.library else ""
+        details = f"ran in {kernel.seconds:.1f} s on {kernel.threads} threads{loaded}"
+        checks.append(Check("test kernel", True, details))
+        checks.append(Check("shadow-ray epsilon", None, f"{kernel.epsilon:.4g}, relative; measured"))
     elif variant:
-        check("test kernel", False, "failed")
-    return {"works": problem is None, "problem": problem, "variant": variant, "kernel": kernel, "checks": checks}
+        checks.append(Check("test kernel", False, "failed"))
+    return Machine(problem is None, problem, variant, kernel, tuple(checks))
 
 
-def try_kernel(variant: str, patience: float = _PATIENCE) -> dict[str, Any]:
-    """Run a kernel in a process of its own and return what it found, or its ``problem``."""
-    environment = child_environment(variant)
-    command = [sys.executable, "-m", "reports.machine.doctor", "--probe"]
-    try:
-        ran = subprocess.run(command, capture_output=True, text=True, timeout=patience, env=environment, cwd="/")
-    except subprocess.TimeoutExpired:
-        return {"problem": f"the test kernel in {variant} did not end within {patience:.0f} s"}
-    if ran.returncode == 0:
-        return json.loads(ran.stdout.splitlines()[-1])
-    words = [line for line in ran.stderr.splitlines() if line.strip()]
-    how = f"exit status {ran.returncode}"
-    if ran.returncode < 0:
-        how = f"killed by {signal.Signals(-ran.returncode).name}"
-    return {"problem": f"the test kernel in {variant} failed, {how}: {words[-1] if words else 'without a word'}"}
+def try_kernel(variant: str) -> Kernel:
+    """Run a kernel in a process of its own; raises EndedError or MissingError where it does not work."""
+    return in_own_process(probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant)
 
 
-def _probe() -> None:
-    """Cast a ray at a sphere in the chosen variant and check where it meets it."""
-    from reports.machine.environment import activate
-
+def probe() -> Kernel:
+    """Cast a ray at a sphere in the current variant, and check where it meets it."""
     start = time.perf_counter()
-    variant = activate()
     import drjit as dr
     import mitsuba as mi
 
@@ -221,15 +234,9 @@ def _probe() -> None:
     towards = scene.ray_intersect(mi.Ray3f(mi.Point3f([0, 3], 0, -2), mi.Vector3f(0, 0, 1)))
     distances = towards.t.numpy().tolist()
     if abs(distances[0] - 1.5) > 1e-5 or distances[1] < 1e30:
-        sys.exit(f"wrong result: distances {distances}, wanted 1.5 and infinity")
-    facts = {
-        "variant": variant,
-        "threads": dr.thread_count(),
-        "library": _loaded_llvm(),
-        "epsilon": measure_shadow_epsilon(),
-        "seconds": time.perf_counter() - start,
-    }
-    print(json.dumps(facts))
+        raise MissingError(f"the test kernel is wrong: distances {distances}, wanted 1.5 and infinity")
+    epsilon = measure_shadow_epsilon()
+    return Kernel(mi.variant(), dr.thread_count(), _loaded_llvm(), epsilon, time.perf_counter() - start)
 
 
 def _loaded_llvm() -> str | None:
@@ -242,7 +249,4 @@ def _loaded_llvm() -> str | None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--probe"]:
-        _probe()
-    else:
-        print(*missing_packages())
+    print(*missing_packages())

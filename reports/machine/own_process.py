@@ -37,8 +37,11 @@ def in_own_process(
     limit: float | None = None,
     what: str = "method",
     quick: bool = False,
+    variant: str | None = None,
 ) -> Any:
-    """Call a function in a new process with the current variant; return what it returns, raise what it raises.
+    """Call a function in a new process; return what it returns, raise what it raises.
+
+    The variant is the current one by default.
 
     The function is at the top of a module of ours and prints nothing on the output; arguments and result are pickled.
     `what` and `name` name the work in messages. After `limit` [s] the process is ended: math.inf is never, None what
@@ -51,7 +54,7 @@ def in_own_process(
         [sys.executable, "-P", "-m", "reports.machine.own_process", str(os.getpid())],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        env=child_environment() | (quick_compilation.settings() if quick else {}),
+        env=child_environment(variant) | (quick_compilation.settings() if quick else {}),
         start_new_session=True,
     ) as process:
         try:
@@ -59,8 +62,8 @@ def in_own_process(
                 pickle.dumps((sys.argv, function, arguments)), None if seconds == math.inf else seconds
             )
         except subprocess.TimeoutExpired:
-            hint = f"did not end within {seconds:g} s and was stopped; {LIMIT_VARIABLE}={2 * seconds:g} allows more"
-            raise EndedError(f"{what} {name}: {hint}") from None
+            hint = "" if limit else f"; {LIMIT_VARIABLE}={2 * seconds:g} allows more"
+            raise EndedError(f"{what} {name}: did not end within {seconds:g} s and was stopped{hint}") from None
         finally:
             _end(process)
     if not answer:
