@@ -18,6 +18,7 @@ fixed sections first find the points that see only a part of a flat light: these
 gets: eight independent scramblings each give a mean, and their spread the standard error.
 """
 
+import itertools
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -59,6 +60,7 @@ Fraction = Callable[[float], None]
 
 _RTOL = 1e-6  # of the integral of one sample, whose estimate is many digits too large: far below the error of a mean
 _PAIRS = 1 << 16  # rays and samples at once
+_RAYS = 1 << 12  # rays of a part of the work that is kept
 _EVERY = 7  # of the pairs is checked by a shadow ray: odd, so that it steps through all samples
 _BEFORE = 1e-6  # of the way to a surface: how far before it what lights it is looked at
 _PROBES = 8  # sections of a light that say whether a surface point sees it as a whole
@@ -138,27 +140,29 @@ def _by_replicate(
     keep: Keep,
     add: Callable[[Index, Kept], None] = lambda active, got: None,
 ) -> Sums:
-    """Return the sums of a layer for `replicate_means`: work(number of the light, rays, points of the square)."""
-    rounds, done = 2 * plan.rounds * lights * REPLICATES, 0
+    """Return the sums of a layer for `replicate_means`: work(number of the light, rays, points of all replicates)."""
+    rounds, done = 2 * plan.rounds * lights, 0.0
 
     def sums(part: str, chosen: PointPlan, active: Index) -> Array:
         nonlocal done
         total = np.zeros((len(active), 3, REPLICATES))
-        for number in range(lights):
-            found, fractions = np.zeros(total.shape), np.ones((len(active), REPLICATES))
-            for replicate in range(REPLICATES):
-                one = partial(work, number, active, partial(square_points, chosen, number, replicate))
-                got = keep(f"{layer}-{part}{number}-{chosen.most}-{replicate}", one)
-                found[..., replicate] = got["radiance"]
-                fractions[:, replicate] = got.get("fraction", 1.0)
-                if part != PILOT:
-                    add(active, got)
-                done += 1
-                tell(done / rounds)
-            total += _controlled(found, fractions)
+        for number, first in itertools.product(range(lights), range(0, len(active), _RAYS)):
+            rows = slice(first, first + _RAYS)
+            one = partial(work, number, active[rows], partial(_points, chosen, number))
+            got = keep(f"{layer}-{part}{number}-{chosen.most}-{first}", one)
+            total[rows] += _controlled(got["radiance"], got["fraction"]) if "fraction" in got else got["radiance"]
+            if part != PILOT:
+                add(active[rows], got)
+            done += len(active[rows]) / len(active)
+            tell(done / rounds)
         return total
 
     return sums
+
+
+def _points(plan: PointPlan, number: int, kind: str) -> Array:
+    """Return the points of the unit square of all replicates of a light, one replicate after the other."""
+    return np.concatenate([square_points(plan, number, replicate, kind) for replicate in range(REPLICATES)])
 
 
 def _controlled(found: Array, fractions: Array) -> Array:
@@ -181,9 +185,9 @@ def turn_of_sections(plan: PointPlan, number: int) -> float:
 
 
 def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) -> Kept:
-    """Return sums over samples: radiances and bounds of their errors, (rays, 3) each, and counts of the checks."""
+    """Return sums over samples: radiances, (rays, 3, replicates), bounds of their errors, and counts of the checks."""
     reference, light, count, each = beam.scene, beam.light, len(active), len(square)
-    radiance, bound, checks = np.zeros((count, 3)), np.zeros((count, 3)), [RandomChecks()]
+    radiance, bound, checks = np.zeros((count, 3, REPLICATES)), np.zeros((count, 3)), [RandomChecks()]
     step = max(1, _PAIRS // each)
 
     def lit_pairs() -> Iterator[tuple[slice, Rays, Array, Array, LitIntervals]]:
@@ -206,8 +210,11 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
         distance = np.repeat(beam.distance[active[rows]], each)
         parts = field_of(reference).sums(rays, (lit.ray, lit.low, lit.high), distance, terms)
         parts = parts[0], parts[1] + worth_of_doubt(reference, rays, lit)
-        value, error = ((part * weight[:, None]).reshape(-1, each, 3).sum(axis=1) * light.radiance for part in parts)
-        return rows, lit.random_checks, value, error
+        value, error = (
+            (part * weight[:, None]).reshape(-1, REPLICATES, each // REPLICATES, 3).sum(axis=2) * light.radiance
+            for part in parts
+        )
+        return rows, lit.random_checks, np.moveaxis(value, 1, 2), error.sum(axis=1)
 
     for rows, found, value, error in done_ahead(summed, lit_pairs(), workers=dr.thread_count()):
         radiance[rows], bound[rows] = value, error
@@ -247,13 +254,14 @@ def area_surface(
     hidden = [_partly_hidden(beam, rows, turn) for beam, turn in zip(beams, turns, strict=True)]
 
     def work(number: int, active: Index, points: Callable[[str], Array]) -> Kept:
-        radiance, fraction, beam = np.zeros((len(active), 3)), np.ones(len(active)), beams[number]
+        radiance, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
+        beam = beams[number]
         for pairs, kind in ((False, beam.light.kind), (True, "pairs")):
             chosen = np.flatnonzero(hidden[number][active] == pairs)
             if len(chosen):
                 pixels, view = rows[active[chosen]], _View(beam, points(kind), turns[number], pairs)
                 radiance[chosen], fraction[chosen] = _reflected(view, pixels, shadow_scale, reflection)
-        return {"radiance": radiance * np.exp(-depth[active]), "fraction": fraction}
+        return {"radiance": radiance * np.exp(-depth[active])[..., None], "fraction": fraction}
 
     sums = _by_replicate("surface", len(beams), plan, work, tell=tell, keep=keep)
     result[rows], _ = replicate_means(len(rows), known[rows], plan, sums)
@@ -313,13 +321,15 @@ def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
 def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Reflection) -> tuple[Array, Array]:
     """Return sums over samples of what surface points reflect, before what is between them and the camera.
 
-    The second array says which fraction of the light's solid angle the sections of a point have, (rays,) [1].
+    They are by replicate, (rays, 3, replicates). The second array says which fraction of the light's solid angle the
+    sections of a point have, (rays, replicates) [1].
     """
     light, reference, each = view.beam.light, view.beam.scene, len(view.square)
-    total, fraction = np.zeros((len(active), 3)), np.ones(len(active))
+    total, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
     for rows, point, (row, place, weight), whole in view.seen(active):
         if view.even and light.kind == "rectangle":
-            fraction[rows] = whole.mean(axis=1) / solid_angle(light, point)
+            means = whole.reshape(len(rows), REPLICATES, -1).mean(axis=2)
+            fraction[rows] = means / solid_angle(light, point)[:, None]
         of = rows[row // each]
         point = point[row // each]
         way = place - point
@@ -327,7 +337,10 @@ def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Refl
         towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
         value = reflection(active[of], towards)
         shadow = optical_depth(reference, point, towards, np.zeros(len(of)), shadow_scale * r)
-        total += sums_of(of, value * np.exp(-shadow) * weight[:, None] * light.radiance, len(total))
+        radiance = value * np.exp(-shadow) * weight[:, None] * light.radiance
+        # The sections of a point are in the order of replicates.
+        found = sums_of(row * REPLICATES // each, radiance, len(rows) * REPLICATES)
+        total[rows] = np.moveaxis(found.reshape(len(rows), REPLICATES, 3), 1, 2)
     return total, fraction
 
 

@@ -13,7 +13,7 @@ from reference.quadrature import area_lights
 from reference.quadrature.area_lights import area_surface, beams_of
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.light_samples import samples_for_rays, sections_for_points
-from reference.quadrature.replicates import PointPlan, square_points, standard_error
+from reference.quadrature.replicates import REPLICATES, PointPlan, square_points, standard_error
 from reference.quadrature.shared_samples import shared_samples
 from reference.quadrature.surface import Reflection, surface_hits
 from reference.scene.read import read_reference
@@ -114,7 +114,8 @@ def test_one_sample_by_plain_quadrature(variant):
     x, distance = 3.5 * (nodes + 1), np.full(len(reference.direction), 7.0)
     samples = samples_for_rays(light, reference.origin, reference.direction, distance, square)
     (beam,) = beams_of(reference, distance)
-    got = area_lights._scattered(beam, np.arange(len(distance)), square, 1.0)["radiance"]
+    every = np.tile(square, (REPLICATES, 1))  # the same sample in each replicate
+    got = area_lights._scattered(beam, np.arange(len(distance)), every, 1.0)["radiance"][..., 0]
     for ray, direction in enumerate(reference.direction):
         away = reference.origin + x[:, None] * direction - samples.place[ray]
         r = np.linalg.norm(away, axis=1)

@@ -74,7 +74,7 @@ def test_reference_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, 
     done, compute = [], area_lights._scattered
 
     def some(*arguments):
-        if len(done) == 5:
+        if len(done) == 1:
             raise KeyboardInterrupt
         done.append(arguments)
         return compute(*arguments)
@@ -92,7 +92,7 @@ def test_reference_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, 
         path.unlink()
     counted.clear()
     assert_same(reference_image(scene), again)
-    assert len(counted) == went_on + 5
+    assert len(counted) == went_on + 1
     image = layered_reference("lamp", again)
     assert {"emitted", "airlight_se", "surface_se", "airlight_bound"} <= set(image.layers)
     assert image.attributes["airlight:batches"] == 8
