@@ -51,8 +51,8 @@ from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 from scipy.special import gammainccinv, gammaincinv
 
 from analytic.errors import InputError
@@ -170,10 +170,10 @@ class Optics:
         return np.pad(self.chi[:count], (0, max(count - len(self.chi), 0)))
 
     @cached_property
-    def spline(self) -> CubicSpline:
+    def spline(self) -> "scipy.interpolate.CubicSpline":
         """The phase function [1] over the scattering angle [rad]."""
         angle = np.linspace(0, np.pi, _ANGLES * len(self.chi) + 1)
-        return CubicSpline(angle, self.series(np.cos(angle)), bc_type="clamped")
+        return scipy.interpolate.CubicSpline(angle, self.series(np.cos(angle)), bc_type="clamped")
 
     def __call__(self, cos_scatter: ArrayLike) -> Array:
         """Return the phase function [1] at cosines of the scattering angle, of any shape."""

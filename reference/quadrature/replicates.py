@@ -44,8 +44,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -96,7 +96,7 @@ def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Ar
         place[:, 0] = 1 - np.abs(2 * place[:, 0] - 1)
         return place
     digits = max(1, plan.most - 1).bit_length()
-    sobol = (qmc.Sobol(2, scramble=False).random(plan.most) * (1 << digits)).astype(np.int64)
+    sobol = (scipy.stats.qmc.Sobol(2, scramble=False).random(plan.most) * (1 << digits)).astype(np.int64)
     return np.stack([_scrambled(column, digits, generator) for column in sobol.T], axis=1)
 
 

@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -190,6 +191,7 @@ def processor() -> str:
     return lines or platform.processor() or platform.machine()
 
 
+@cache
 def versions() -> dict[str, str]:
     """Return the versions of airlight, Python and the packages that make the numbers."""
     from importlib.metadata import PackageNotFoundError, version

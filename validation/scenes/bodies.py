@@ -13,8 +13,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linprog, nnls
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -76,7 +76,7 @@ def overlap(first: Bounds, second: Bounds) -> bool:
         return _distance_to_hull(mesh, sphere.centre) < sphere.radius - margin
     # The largest sphere in both: maximise t under n . x + t <= offset.
     planes = np.concatenate([first.normals, second.normals])
-    largest_sphere = linprog(
+    largest_sphere = scipy.optimize.linprog(
         [0, 0, 0, -1],
         A_ub=np.column_stack([planes, np.ones(len(planes))]),
         b_ub=np.concatenate([first.offsets, second.offsets]),
@@ -96,7 +96,7 @@ def _distance_to_hull(bounds: Bounds, point: Array) -> float:
     weight = 1e4 * bounds.radius
     corners = np.unique(bounds.corners.reshape(-1, 3), axis=0) - point
     matrix = np.vstack([corners.T, np.full(len(corners), weight)])
-    fractions, _ = nnls(matrix, np.array([0.0, 0.0, 0.0, weight]))
+    fractions, _ = scipy.optimize.nnls(matrix, np.array([0.0, 0.0, 0.0, weight]))
     return float(np.linalg.norm(fractions @ corners / fractions.sum()))
 
 

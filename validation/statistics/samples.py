@@ -8,9 +8,9 @@ or by methods, are one sample.
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri, stdtr, stdtrit
-from scipy.stats import binom, binomtest, kstest, quantile_test, spearmanr
 
 Array = NDArray[np.float64]
 
@@ -65,13 +65,14 @@ def binomial_p(successes: int, trials: int, probability: float) -> float:
 
     X is the number of `successes` k in `trials`, each of a `probability` [1].
     """
-    lower, upper = binom.cdf(successes, trials, probability), binom.sf(successes - 1, trials, probability)
+    law = scipy.stats.binom(trials, probability)
+    lower, upper = law.cdf(successes), law.sf(successes - 1)
     return float(min(1.0, 2 * min(lower, upper)))
 
 
 def uniformity_p(p: Array) -> float:
     """Return the p-value of Kolmogorov and Smirnov's test that p-values `p`, of shape (n,), are uniform in [0, 1]."""
-    return float(kstest(p, "uniform").pvalue)
+    return float(scipy.stats.kstest(p, "uniform").pvalue)
 
 
 def bonferroni(p: Sequence[float]) -> float:
@@ -87,7 +88,7 @@ def binomial_interval(successes: int, trials: int, level: float = LEVEL) -> tupl
     """
     if trials == 0:
         return 0.0, 1.0
-    interval = binomtest(successes, trials).proportion_ci(level, method="exact")
+    interval = scipy.stats.binomtest(successes, trials).proportion_ci(level, method="exact")
     return float(interval.low), float(interval.high)
 
 
@@ -99,7 +100,7 @@ def quantile_interval(values: ArrayLike, probability: float) -> tuple[float, flo
     (n,) with n > 0, is too small for an end. Infinities are values.
     """
     sample = np.asarray(values, dtype=np.float64)
-    interval = quantile_test(sample, p=probability).confidence_interval(LEVEL)
+    interval = scipy.stats.quantile_test(sample, p=probability).confidence_interval(LEVEL)
     low, high = (None if np.isnan(end) else float(end) for end in interval)
     return float(np.quantile(sample, probability, method="inverted_cdf")), low, high
 
@@ -117,7 +118,7 @@ def rank_correlation(x: ArrayLike, y: ArrayLike, level: float = LEVEL) -> tuple[
     count = np.size(x)
     if count < 10 or np.ptp(x) == 0 or np.ptp(y) == 0:
         return 0.0, -1.0, 1.0
-    r = float(spearmanr(x, y).statistic)
+    r = float(scipy.stats.spearmanr(x, y).statistic)
     # If both have the same order the formula gives no width: r is taken as if two neighbours had changed places.
     most = 1 - 12 / (count * (count**2 - 1))
     z = np.arctanh(np.clip(r, -most, most))
