@@ -46,14 +46,17 @@ class Picture:
         return load_scene(self.scene, self.size, dict(self.changes)).scene
 
 
-def bring_references(cluster: Client, pictures: Sequence[Picture], *, pixel: str = "centre") -> None:
-    """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here."""
-    lacking = [picture for picture in pictures if not reference_image.is_kept(picture.load(), pixel=pixel)]
+def bring_references(cluster: Client, pictures: Sequence[Picture], **how: Any) -> None:
+    """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here.
+
+    `how`: arguments of `validation.estimates.quadrature.reference_image`.
+    """
+    lacking = [picture for picture in pictures if not reference_image.is_kept(picture.load(), **how)]
     named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
-    given = pixel, fresh_since()
+    given = how, fresh_since()
     groups = [Group((Task(name, _reference, (picture, *given), _LIMIT),)) for name, picture in named.items()]
     for name, value in _done(cluster, groups):
-        reference_image.keep(*value, named[name].load(), pixel=pixel)
+        reference_image.keep(*value, named[name].load(), **how)
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
@@ -96,10 +99,10 @@ def spread(cluster: Client, picture: Picture) -> ElsewhereFor:
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 
 
-def _reference(picture: Picture, pixel: str, since: float | None) -> tuple[ReferenceImage, Spent]:
+def _reference(picture: Picture, how: Mapping[str, Any], since: float | None) -> tuple[ReferenceImage, Spent]:
     scene, spent = picture.load(), stopwatch()
     with fresh_results(since):
-        return reference_image(scene, pixel=pixel), spent()
+        return reference_image(scene, **how), spent()
 
 
 def _batch(kind: bytes, seed: int) -> tuple[Batches, Spent]:

@@ -99,7 +99,7 @@ def write_report(
             if cluster is not None:
                 from reports.cluster.references import bring_references
 
-                bring_references(cluster, [_picture(each, each.size) for each in studies])
+                bring_references(cluster, [_picture(each, each.size) for each in studies], points=study.points)
             ended = _try_own(studies[0], process) if studies else {}
             for each, parts, span in zip(studies, of_scenes, spans):
                 step = part_of(progress, *span, before=f"{each.name}: ")

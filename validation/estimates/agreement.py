@@ -44,8 +44,7 @@ MASK_PIXELS = 2.0
 #: The least margin under area lights, where the quadrature has errors of its own: 3.4e-4 of the mean airlight of
 #: `penumbra-plane`, 8e-4 with the factor of Student's law for eight replicates. No batch makes it less.
 WIDE_MARGIN = 0.0025
-#: Below 32 batches the standard error of a standard error exceeds 13 %; those of single-scatter cost little.
-_LEAST_BATCHES = {"volpath": 32, "single-scatter": 96}
+_LEAST_BATCHES = 32  # below, the standard error of a standard error exceeds 13 %
 _SAMPLES = 64  # a pixel in each batch
 _PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
 
@@ -91,7 +90,7 @@ def agreement(
     go_on = None if seconds is None else (lambda done: time.monotonic() - start <= seconds)
 
     def enough(so_far: Batches) -> bool:
-        if layers and len(so_far.seeds) < _LEAST_BATCHES[estimator]:
+        if layers and len(so_far.seeds) < _LEAST_BATCHES:
             return False
         return all(width_to_reach(compared(so_far, layer), margin) < 1 for layer in layers)
 

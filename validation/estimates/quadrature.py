@@ -34,7 +34,7 @@ from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import Keep
+from reference.quadrature.replicates import Keep, PointPlan
 from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import holds
 from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
@@ -49,18 +49,28 @@ _ROUNDING = 2.0**-24
 
 @kept("quadrature", quadrature_image)
 def reference_image(
-    scene, checks: int = 32, shadow_scale: float = 1.0, pixel: str = "centre", *, progress: Progress | None = None
+    scene,
+    checks: int = 32,
+    shadow_scale: float = 1.0,
+    pixel: str = "centre",
+    points: int | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> ReferenceImage:
     """Return the quadrature reference of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
-    `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`.
+    `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`;
+    `points`: samples of area lights of each replicate, the same for all pixels, None for as many as their error needs.
     Radiance that is not finite is refused.
     """
     reference = read_reference(scene)
     settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
     # Only area lights take so long that a run is worth going on with.
-    keep = _parts(reference_image.key(scene, **settings)) if reference.area and pixel == "centre" else None
-    return _checked_image(reference, settings, keep=keep, progress=progress)
+    keep = None
+    if reference.area and pixel == "centre":
+        keep = _parts(reference_image.key(scene, **settings, points=points))
+    plan = PointPlan(error=0.0, first=points, most=points) if points else None
+    return _checked_image(reference, {**settings, "plan": plan}, keep=keep, progress=progress)
 
 
 def reference_of_pixels(scene, pixels: NDArray[np.integer]) -> ReferenceImage:

@@ -76,7 +76,7 @@ class SceneStudy:
     @cached_property
     def kept_reference(self) -> Kept[ReferenceImage]:
         """The quadrature reference at pixel centres, and what it took."""
-        return reference_image.result(self.loaded.scene)
+        return reference_image.result(self.loaded.scene, points=self.study.points)
 
     @property
     def reference(self) -> ReferenceImage:
@@ -129,7 +129,7 @@ class SceneStudy:
         """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
         lights = len(self.scene.lights) + 16 * len(self.scene.area_lights)
         checks, parts = self.study.checks, dict[str, float]()
-        kept = reference_image.is_kept(self.loaded.scene)
+        kept = reference_image.is_kept(self.loaded.scene, points=self.study.points)
         parts["reference"] = 0.0 if kept else reference_work(self.size, lights=lights).seconds
         with self.at(checks.size) as scene:
             kept = check_reference.is_kept(scene, checks)

@@ -11,6 +11,7 @@ before any work. The measurements of a report are a study too (`validation/study
     flip = "kinds"                                          # of the methods of "quick" alone
     times = "stages"                                        # all stages, frames after light, objects or colours changed
     timed_size = "800x600"                                  # of the frames that are timed
+    points = 16                                             # of area lights in the references, for all rays alike
     seconds = 0.1                                           # on each of these times
     slow = 0.04                                             # a longer frame is timed stage by stage [s]
     frame_limit = 10                                        # a cell is left out if a frame would take longer [s]
@@ -143,6 +144,7 @@ class Study:
     configurations: tuple[Configuration, ...] = ()
     media: tuple[tuple[str, ...], ...] = ((),)
     measure: Measure = Measure()
+    points: int | None = None  #: of area lights in references, see `validation.estimates.quadrature.reference_image`
     flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
     timed: int | None = None  #: scenes that are timed alone, the first; None for all
     limit: float = 600.0  #: seconds that a cell or a reference may take
@@ -422,6 +424,7 @@ _STUDY: Mapping[str, Reader] = {
     "half": several(read_word, 0),
     "sizes": several(_size),
     "media": several(_medium),
+    "points": partial(read_number, least=1, most=1024),
     "flip": _flip,
     "timed": partial(read_number, least=1, most=_MOST_SCENES),
     "limit": partial(read_number, least=1e-3, most=_LONGEST, whole=False),
