@@ -25,18 +25,18 @@ _SIZE = (160, 120)
 def answers(
     name: str, folder: Path, *, python: str | None, samples: int, root: Path = ROOT
 ) -> Iterator[dict[str, Any]]:
-    """Render what is missing of a scene, diagnose all of it, and yield a row for each image.
+    """Render the missing images of a scene, diagnose all of them, and yield a row for each.
 
     Parameters
     ----------
     name
-        Of `SCENES`.
+        A name in `SCENES`.
     folder
-        Of its images; `faults.json` beside it says what was injected, if `python` is None.
+        Folder of its images; `faults.json` next to it lists the injected faults, if `python` is None.
     python
         An interpreter that has `bpy`; None: only images that are there are diagnosed.
     samples
-        Paths per pixel of what is rendered.
+        Paths per pixel of the rendered images.
     root
         The checkout.
     """

@@ -95,7 +95,7 @@ class Picture:
 
     @property
     def command(self) -> str:
-        """What a reader types to see the same."""
+        """The command that shows the same to a reader."""
         if self.kind not in ("scene", "method"):
             return f"python docs/tools/gallery.py {self.name}"
         width, height = SIZE if self.kind == "scene" else SMALL

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the documentation takes from a report: `python docs/tools/measured_data.py [--report DIR] [--kernels FILE]`.
+"""Data of a report for the documentation: `python docs/tools/measured_data.py [--report DIR] [--kernels FILE]`.
 
 It writes the table of the README and `docs/data/report.json`: `report` (when, by which command, on which machine),
 `claims`, `scenes` (each with `counts`, `reference`, `multiple` and `methods`) and `kernels` (costs and errors of

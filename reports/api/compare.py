@@ -62,8 +62,8 @@ def compare(
     Parameters
     ----------
     reference
-        What to compare with: an EXR file, or a scene (built-in or a Mitsuba XML file); from Python also what
-        `reference` or `render` returned, or an array (height, width, 3) [W/(m^2 sr)].
+        The image to compare with: an EXR file, or a scene (built-in or a Mitsuba XML file); from Python also a result
+        of `reference` or `render`, or an array (height, width, 3) [W/(m^2 sr)].
     test
         The image to judge, an EXR file; from Python also a result or an array. With a scene also several files, # for
         each digit of their number, such as frames/####.exr: the frames of `--frames`, or independent renders.

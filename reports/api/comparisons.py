@@ -96,7 +96,7 @@ class ImageComparison(Comparison, Pictured):
 
     @property
     def title(self) -> str:
-        """What is compared with what."""
+        """The compared layer and images."""
         return f"{self.layer} of {self.names[1]} against {self.names[0]}"
 
     def __repr__(self) -> str:

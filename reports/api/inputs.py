@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the public functions take, from Python and from the command line, and the one exception that they raise.
+"""Arguments of the public functions, from Python and from the command line, and the one exception that they raise.
 
-A type has two meanings. For a reader and for mypy it is what Python may give. At run time it is what a command line
-gives, a word or several, from which `reports.commands.main` makes the command of a function.
+A type has two meanings. For a reader and for mypy it describes arguments from Python. At run time it describes
+arguments of a command line, a word or several, from which `reports.commands.main` makes the command of a function.
 """
 
 import functools

@@ -118,7 +118,7 @@ def render(
         Render an animation with this many frames, as NAME-0001.exr and so on. NAME.json lists the changes of lights,
         colours or a homogeneous medium, for `compare --frames`.
     animate
-        What moves: light, objects, medium, colour, or several with commas; the scene's animation by default.
+        The motion: light, objects, medium, colour, or several with commas; the scene's animation by default.
     run
         Number of the run. A noisy method draws different random numbers in each run, and the same ones when a run is
         repeated.
@@ -138,7 +138,7 @@ def render(
     Raises
     ------
     InputError
-        For what is not known, for what the method refuses, and for options that do not go together.
+        For unknown names, features that the method refuses, and options that do not go together.
 
     Examples
     --------
@@ -178,7 +178,7 @@ def render(
 
 @dataclass(frozen=True)
 class _Asked:
-    """What to render, and by what."""
+    """A scene to render and its configuration."""
 
     scene: Any
     pixels: tuple[int, int] | None

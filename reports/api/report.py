@@ -65,7 +65,7 @@ class Report(Result):
 
     @property
     def faults(self) -> Sequence[str]:
-        """What user methods did wrong."""
+        """The faults of user methods."""
         from reports.report.claims import own_faults
 
         return own_faults(row for scene in self.data.scenes for row in scene.methods)

@@ -194,7 +194,7 @@ class Rendering(LayeredImage):
 
     @property
     def lines(self) -> Sequence[str]:
-        """What it costs, and which files were written."""
+        """The cost of the frame, and the files that were written."""
         lines = [f"{self.title}" + ("" if self.times else "; --timed measures what a frame costs")]
         if self.times is not None:
             ms = {name: f"{time:.3g} ms" for name, time in self.times.medians.items()}

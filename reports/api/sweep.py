@@ -34,7 +34,7 @@ class Problem:
 
 @dataclass(frozen=True, repr=False, kw_only=True)
 class SweepRun(Result):
-    """What became of the cells of a sweep."""
+    """The outcome of the cells of a sweep."""
 
     study: str
     scenes: int

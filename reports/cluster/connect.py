@@ -64,7 +64,7 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
     settings: dict[str, object] = {
         # Dask would pause a worker near its limit, and wait for memory that only the next task gives back.
         **{f"distributed.worker.memory.{name}": False for name in ("target", "spill", "pause")},
-        # What became of a group whose process died is decided by `reports.cluster.run`.
+        # `reports.cluster.run` decides about a group whose process died.
         "distributed.scheduler.allowed-failures": 0,
         # No group waits behind another that takes minutes while a worker has nothing to do.
         "distributed.scheduler.worker-saturation": 1.0,

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """References and batches of references from a cluster: the cache of this machine gets them, and the rest is as without.
 
-So the bytes of a file do not depend on where its numbers were computed. What workers did not bring, whatever became of
-them, is computed here.
+The bytes of a file therefore do not depend on the machine that computed its numbers. Results that workers did not
+deliver, for any reason, are computed here.
 """
 
 import pickle

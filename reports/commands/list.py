@@ -15,13 +15,13 @@ _LONG = {"long": True}
 
 @dataclass(frozen=True, repr=False)
 class Listing(Result):
-    """What there is, a table for each kind."""
+    """The available names, a table for each kind."""
 
     kinds: Mapping[str, Table]
     single: bool  #: whether one kind was asked for
 
     def to_dict(self) -> Any:
-        """Return the rows as words: by kind, or of the one that was asked for."""
+        """Return the rows as words: by kind, or of the requested one."""
         data = {
             kind: [{key: text_of(value) for key, value in row.values.items()} for row in each.rows]
             for kind, each in self.kinds.items()

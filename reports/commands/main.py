@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line: each command is the public function of `airlight` of the same name.
 
-Cyclopts reads a function's signature and its docstring, so that the docstring is the help. What is added here is said
-of all commands alike: --json prints the result's data, -o writes it to files. A command
-returns a result (`reports.tables.record`), which is printed and decides the exit status. To add a command, write a
-public function in `reports/api/`, name it in `airlight.py`, and add it to its panel in `_PANELS`.
+Cyclopts reads a function's signature and its docstring, so that the docstring is the help. This module adds the options
+of all commands: --json prints the result's data, -o writes it to files. A command returns a result
+(`reports.tables.record`), which is printed and decides the exit status. To add a command, write a public function in
+`reports/api/`, name it in `airlight.py`, and add it to its panel in `_PANELS`.
 
 Modules of commands import nothing heavy at the top, so that `--help` answers at once.
 """
@@ -91,11 +91,11 @@ def _shown_default(value: Any) -> Any:
 
 
 def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Callable[..., int]:
-    """Return a function as a command: with options for its output, without what only Python can give."""
+    """Return a function as a command: with options for its output, without arguments that only Python can give."""
     own = inspect.signature(function).parameters
     scope = inspect.unwrap(function).__globals__
     words = {each.arg_name: _plain(each.description) for each in docstring_parser.parse(function.__doc__ or "").params}
-    # What has --set takes a kernel by --set kernel=NAME.
+    # A command with --set takes a kernel by --set kernel=NAME.
     sets = "settings" in own or any(each.kind is inspect.Parameter.VAR_KEYWORD for each in own.values())
     positional: list[inspect.Parameter] = []
     named: list[inspect.Parameter] = []

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The records of report.json: their fields are its keys, with units and meanings.
 
-`reports.data.reader` makes them of the file and refuses what does not fit their types. Who draws a page, a table or a
-figure, or compares two reports, takes records. What is None is `null` in the file: not known, not measured, not finite.
-Fields with a default came after the first reports of the version.
+`reports.data.reader` makes them from the file and refuses values that do not fit their types. Code that draws a page, a
+table or a figure, or compares two reports, takes records. None is `null` in the file: not known, not measured, not
+finite. Fields with a default came after the first reports of the version.
 """
 
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What the study asked for."""
+    """The settings of the study."""
 
     name: str = column(meaning="`quick`, `default`, `full`, or that of a study of one's own")
     scenes: tuple[str, ...] = column(meaning="the scenes of the report")
@@ -57,7 +57,7 @@ class Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class Environment:
-    """What made the numbers."""
+    """The software and hardware that made the numbers."""
 
     versions: Mapping[str, str] = column(meaning="by package")
     platform: str
@@ -99,7 +99,7 @@ class Reference:
 
 @dataclass(frozen=True, kw_only=True)
 class MethodRow:
-    """What a method costs in a scene and how wrong it is, or the same of an engine's image."""
+    """The cost and error of a method in a scene, or of an engine's image."""
 
     label: str = column(meaning="its name in tables")
     kind: Literal["built-in", "function", "image"] = column(meaning="`function` of a user, `image` of an engine")
@@ -146,7 +146,7 @@ class SceneFiles:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What was measured in a scene."""
+    """The measurements in a scene."""
 
     name: str = column(meaning="of the scene")
     purpose: str = column(meaning="what it is for")

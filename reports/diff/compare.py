@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two reports compared: what got slower or less accurate beyond the noise, what is new and what is gone.
+"""Two reports compared: methods that got slower or less accurate beyond the noise, that are new or that are gone.
 
-What counts as noise is derived in `validation.statistics.noise`. A finding is worse, better, or a note; anything worse
-makes the comparison fail, and so does what disappeared: a method that is no longer measured is no longer guarded.
+`validation.statistics.noise` derives the limits of noise. A finding is worse, better, or a note; anything worse
+makes the comparison fail, and so does a missing method: a method that is no longer measured is no longer guarded.
 """
 
 import math
@@ -262,7 +262,7 @@ def _kind(row: Judged, now: Judged) -> str:
     return "note"
 
 
-# What is printed
+# Printed output
 
 
 def difference_tables(difference: Difference) -> list[Table]:

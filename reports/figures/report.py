@@ -86,7 +86,7 @@ def _timed(scene: Scene) -> list[MethodRow]:
 def draw_speed(scenes: Sequence[Scene], column: str) -> Any:
     """Return the time of a frame against the error of the airlight, a panel for each scene."""
     timed = {scene.name: _timed(scene) for scene in scenes if _timed(scene)}
-    # Of all labels, also those without a point: variants are numbered as in the report, so that its page agrees.
+    # Styles follow from all labels, with or without a point: variants are numbered as on the report's page.
     there = {entry.label for entries in timed.values() for entry in entries}
     rows = (row for scene in scenes for row in scene.methods)
     styles = {label: style for label, style in report_styles(rows).items() if label in there}

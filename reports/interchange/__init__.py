@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What other renderers need to render the same scene.
+"""Scenes for other renderers.
 
 Read in this order:
 

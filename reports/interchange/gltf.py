@@ -6,8 +6,8 @@ quarter about an axis, which is exact, so that its own up axis becomes y: with z
 
 Lights are those of KHR_lights_punctual. Its unit is the candela, 1 lm/sr, and its colours are RGB factors: here the
 largest channel of the intensity in W/sr stands as the intensity, the channels over it as the colour, with no factor of
-683 lm/W. Its spots fall off otherwise than Mitsuba's and their inner angle must be smaller than the outer one. What the
-scene really has is in the `extras` of each light, camera, material and medium.
+683 lm/W. Its spots fall off otherwise than Mitsuba's and their inner angle must be smaller than the outer one. The
+`extras` of each light, camera, material and medium hold the exact values of the scene.
 
 The file is written here, not by trimesh, which writes the ratio of the angles of view as the aspect ratio of a camera,
 3 % off at 52 degrees, and no lights.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What this machine has, and the check that every command runs before its first kernel.
+"""The environment of this machine, and the check that every command runs before its first kernel.
 
 Importing this module imports neither Mitsuba nor Dr.Jit. `activate` is the only place that sets a Mitsuba variant.
 """
@@ -39,7 +39,7 @@ class MissingError(RuntimeError):
 
 @dataclass(frozen=True)
 class Prepared:
-    """What the check before the first kernel chose."""
+    """The choices of the check before the first kernel."""
 
     variant: str
     llvm: Llvm | None  #: the library that Dr.Jit will load; None with CUDA, which needs none

@@ -4,8 +4,8 @@
 Dr.Jit 1.5 compiles its kernels with whatever libLLVM it meets first: the file named by `DRJIT_LIBLLVM_PATH`, else
 `libLLVM.so` as the dynamic linker finds it, else the newest of `/usr/lib/<multiarch>/libLLVM*.so.*` (drjit-core,
 `src/llvm_api.cpp`). It accepts version 11 and newer, but 14 and 15, Debian 12's default, abort the process in the
-kernels of Mitsuba's volumetric path tracer. So the choice is made here, from file names alone: nothing is loaded,
-because a library that is loaded wins over any later setting.
+kernels of Mitsuba's volumetric path tracer. The choice is therefore made here, from file names alone: nothing is
+loaded, because a library that is loaded wins over any later setting.
 """
 
 import os
@@ -19,7 +19,7 @@ from pathlib import Path
 OLDEST_LLVM = 17
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
-# Of the distributions and apt.llvm.org, of Homebrew, and of archives unpacked in /opt or /usr/local.
+# Folders of the distributions and apt.llvm.org, of Homebrew, and of archives unpacked in /opt or /usr/local.
 _FOLDERS = (
     *(
         f"usr/lib/{os.uname().machine}-linux-gnu",

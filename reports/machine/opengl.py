@@ -13,7 +13,7 @@ _DEBIAN = "apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
 
 @dataclass(frozen=True)
 class OpenGl:
-    """What draws shaders here."""
+    """The OpenGL device that draws shaders."""
 
     works: bool
     reason: str  #: device, version and its error on certified integrals, or why there is none and what to do

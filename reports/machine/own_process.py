@@ -3,9 +3,9 @@
 whose kernels are to compile quickly.
 
 The caller sends the name of one of our functions with arguments that name scenes and methods; the process imports the
-user's code and sends back what the function returns. What it prints goes to the error stream, so that the output is the
-command's own. The process leads a group, so that all that the user's code started ends with it; it ends with its
-caller, however that ends.
+user's code and sends back the result of the function. Its prints go to the error stream, so that they do not mix with
+the command's output. The process leads a group, so that all that the user's code started ends with it; it ends with its
+caller, however the caller ends.
 """
 
 import math

@@ -14,13 +14,13 @@ import sys
 def default_signals() -> None:
     """Let SIGINT and SIGTERM end this process, which a shell reports as the status 130 and 143; for main programs."""
     for number in (signal.SIGINT, signal.SIGTERM):
-        # What the parent ignores stays ignored, as by nohup and for jobs in the background.
+        # Signals that the parent ignores stay ignored, as by nohup and for jobs in the background.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
 
 
 def usable_streams() -> None:
-    """Open closed standard streams to nothing, and let no character be too much for an output.
+    """Open closed standard streams to nothing, and let no character fail in an output.
 
     A file that is opened where a stream was closed would take its number, and with it all that is printed. An output in
     ASCII has question marks for what it lacks.

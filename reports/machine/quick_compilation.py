@@ -2,20 +2,20 @@
 """A hack: kernels that compile faster and run slower, for work that runs most of them once.
 
 Dr.Jit has LLVM optimise every kernel for all that it is worth: the passes of `-O2`, then the third level of code
-generation. A random scene has kernels of its own, and an image of it is rendered once: two thirds of a sweep's time
-went into that. LLVM has no setting for Dr.Jit to pass on, but options of its own command line, which any program can
+generation. A random scene has its own kernels, and an image of it is rendered once: two thirds of a sweep's time went
+into compilation. LLVM has no setting for Dr.Jit to pass on, but options of its own command line, which any program can
 set through its C interface, `LLVMParseCommandLineOptions`:
 
 - `-opt-bisect-limit=0`, meant for finding the pass that breaks a program, runs no pass that can be left out;
 - `-optimize-regalloc=false` allocates registers in one go.
 
 None of the passes may change a result: IEEE arithmetic stays as it is written. The tests compare images bit for bit.
-What it gains is in the column `cpu_ms` of two sweeps, with `times` of "none" and of "with"; what it costs is printed by
-`AIRLIGHT_COMPILATION=quick airlight study methods`. No time that is published is of such kernels. They have a folder of
-their own in Dr.Jit's cache, as its keys do not know how a kernel was compiled.
+The column `cpu_ms` of two sweeps, with `times` of "none" and of "with", shows the gain; the loss is printed by
+`AIRLIGHT_COMPILATION=quick airlight study methods`. No published time is of such kernels. They have a separate folder
+in Dr.Jit's cache, as its keys do not tell how a kernel was compiled.
 
-LLVM says of each pass that it does not run it, on the standard error. So that is passed on by a process that leaves
-this out: what is said before the process that compiles aborts is passed on too.
+LLVM reports each pass that it does not run on the standard error. A second process therefore passes the standard error
+on without these reports, also messages from before an abort of the process that compiles.
 """
 
 import ctypes

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""Images as integers that compress well, for a page that decodes them in the browser.
 
-A page holds hundreds of images. What a reader looks at are the errors, and these must not drown in the rounding of the
-encoding: a half float moves a radiance by up to 5e-4, a good method by 1e-6. So only the reference is stored as
-radiance; of every other image its difference from the reference is, relative as in `validation.metrics.errors`:
+A page holds hundreds of images. Readers look at the errors, which must not drown in the rounding of the encoding: a
+half float moves a radiance by up to 5e-4, a good method by 1e-6. Therefore only the reference is stored as radiance;
+every other image is stored as its difference from the reference, relative as in `validation.metrics.errors`:
 
     d = (test - reference) / max(|reference|, floor),        floor = 0.001 mean(reference)
     code = round(k asinh(d / s)),       k = 250, s = 1e-4     16 bits

@@ -136,7 +136,7 @@ def _inline(path: Path) -> str:
 def _lead(scenes: Sequence[Scene], shown: Sequence[int]) -> int | None:
     """Return the place of the scene that opens the page: with the most edges between light and shadow; None for none.
 
-    Of equals the first; `shown` are the places of the scenes that have images.
+    The first of equals is taken; `shown` are the places of the scenes that have images.
     """
     return max(shown, key=lambda place: scenes[place].reference.transitions, default=None)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Figures for papers: an empty one, pictures in a grid, and how a figure becomes a file.
 
-What varies from run to run, such as the date, is in no file: the same numbers give the same bytes.
+Files hold nothing that varies from run to run, such as the date: the same numbers give the same bytes.
 """
 
 import io
@@ -82,7 +82,7 @@ def speed_panel(
 ) -> dict[str, Any]:
     """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label.
 
-    Of a method that draws random numbers a bar goes down from its error to its bias, or to the most that it may be.
+    For a method that draws random numbers a bar goes down from its error to its bias, or to the largest possible bias.
     """
     points = {}
     for entry in entries:

@@ -97,8 +97,8 @@ def reference_style() -> dict[str, Any]:
 def report_styles(rows: Iterable[Any]) -> dict[str, dict[str, Any]]:
     """Return the marker style of every label of a report, the same in its page and in all figures made from it.
 
-    Rows have a `method` and a `label`. Variants of a method are numbered in the order in which they come. Of methods
-    that are not built in the first two have styles of their own, and those after them begin again.
+    Rows have a `method` and a `label`. Variants of a method are numbered in the order in which they come. Among methods
+    that are not built in, the first two have their own styles, which the next ones use again.
     """
     variants: dict[str, dict[str, None]] = {}
     for row in rows:

@@ -64,12 +64,11 @@ def write_report(
 ) -> Report:
     """Study scenes and write the report into a folder; return the content of report.json, see docs/formats.md.
 
-    Of the sizes and media of the study the first alone counts. `images` from elsewhere are judged, by scene, at their
+    Only the first of the sizes and media of the study counts. `images` from elsewhere are judged, by scene, at their
     size. The page names `command` under "how to reproduce". `fresh` computes everything again. With `apart` user
     methods run in processes of their own, where a fault becomes a row (`own_faults`); else it ends the report. `noted`
-    is called with what is to be said of the scenes before the work. Workers of `cluster` compute references and the
-    batches that check them; methods run here. What cannot be used is refused, and nothing that was there before is
-    damaged.
+    is called with notes on the scenes before the work. Workers of `cluster` compute references and the batches that
+    check them; methods run here. Unusable input is refused, and an existing report is not damaged.
     """
     names = tuple(study.scene_names())
     _refuse_twins(names)

@@ -35,7 +35,7 @@ class OtherPart:
 
     @property
     def seconds(self) -> float:
-        """What it will take [s]."""
+        """Expected time [s]."""
         return 0.0 if self.function.is_kept(*self.given) else self.usual
 
     def result(self, progress: Progress) -> Kept[Any]:

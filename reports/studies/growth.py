@@ -48,7 +48,7 @@ def scaling(
     scenes
         Built-in scenes, random:SEED and Mitsuba XML files; colonnade by default.
     kinds
-        What grows: some of size,triangles,lights,map; all by default.
+        The kinds of growing work: some of size,triangles,lights,map; all by default.
     method
         A method, as in `airlight study methods`; by default one configuration of each method with shadows.
     size

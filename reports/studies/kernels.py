@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 else:
     CasesLike = File
 
-# What they cost
+# Costs
 
 _STATISTICS = {"median": "half of the rays", "p99": "99 % of the rays", "max": "worst ray"}
 _SHOWN = (1e-7, 10.0)  # errors; those outside are drawn at the edge

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def loaded_scenes(scenes: Any, size: Any) -> list[Any]:
-    """Return the scenes, loaded; those for fog by default. What cannot be used is refused before the work."""
+    """Return the scenes, loaded; those for fog by default. Unusable scenes are refused before the work."""
     from reports.api.scenes import opened
     from validation.scenes.registry import FOG_SCENES
 

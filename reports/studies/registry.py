@@ -141,15 +141,15 @@ def summary(name: str) -> str:
 def study(name: str, *arguments: Any, **named: Any) -> Any:
     """Run a study: measurements of methods and kernels, with tables and a figure.
 
-    `airlight study NAME --help` says what a study takes. It returns rows, tables
-    and data; `save`, or -o, writes tables (.csv, .tex, .md), data (.json) or the figure (.pdf, .png).
+    `airlight study NAME --help` lists the arguments of a study. It returns rows, tables and data; `save`, or -o, writes
+    tables (.csv, .tex, .md), data (.json) or the figure (.pdf, .png).
 
     Parameters
     ----------
     name
-        Of `airlight list studies`.
+        A name of `airlight list studies`.
     arguments, named
-        What the study takes.
+        Arguments of the study.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a sweep says, from its Parquet alone: claims with their intervals, figures, a page.
+"""The results of a sweep, from its Parquet alone: claims with their intervals, figures, a page.
 
 Read in this order:
 

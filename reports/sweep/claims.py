@@ -42,7 +42,7 @@ class Claim:
 
     @property
     def fraction(self) -> float | None:
-        """Of the scenes that are within the error for sure; None of no scene."""
+        """Fraction of the scenes that are within the error for sure; None without scenes."""
         return self.within / self.tries if self.tries else None
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What was refused and why, what is wrong with rows whatever their error, and the scenes with the largest errors.
+"""Refusals with their reasons, faults of rows at any error, and the scenes with the largest errors.
 
 Refusals and faults are of all rows, drawn scenes and named ones.
 

@@ -34,7 +34,7 @@ _VERSIONS = ("airlight", "source", "mitsuba", "drjit", "python", "variant", "hos
 
 @dataclass(frozen=True)
 class Summary:
-    """What a sweep says."""
+    """The results of a sweep."""
 
     sweep: Sweep
     drawn: bool  #: whether claims are about scenes that were drawn at random

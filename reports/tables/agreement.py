@@ -92,7 +92,7 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
         explanation=(
             "The reference is a quadrature in double precision, with a bound of its error as a fraction of the mean "
             "airlight. Two Monte Carlo estimators, which share no derivation with it, check it: the 95 % interval of "
-            "their relative bias must lie inside a margin. Of several layers the interval that fills most of its "
+            "their relative bias must lie inside a margin. Among several layers the interval that fills most of its "
             "margin is shown; each scene below has them all."
         ),
     ).only(*order)

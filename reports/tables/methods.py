@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What methods cost and how wrong they are: a table of studies, the page, the documentation and papers."""
+"""Costs and errors of methods: a table of studies, the page, the documentation and papers."""
 
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What public functions return: a result knows its tables, its words and its data.
+"""The results of public functions, with their tables, words and data.
 
 A terminal, a notebook, Markdown and JSON show the same result; `reports.commands.main` prints it, and ends with the
 status 1 where it did not pass.
@@ -51,11 +51,11 @@ _NARROW = 240
 
 
 class Result:
-    """What a function returns."""
+    """The result of a function."""
 
     @property
     def title(self) -> str:
-        """What it is about."""
+        """Title of the output."""
         return ""
 
     @property
@@ -75,7 +75,7 @@ class Result:
 
     @property
     def faults(self) -> Sequence[str]:
-        """What is wrong, for the error stream."""
+        """Faults, for the error stream."""
         return ()
 
     @property
@@ -121,7 +121,7 @@ class Said(Result):
 
     @property
     def title(self) -> str:
-        """What it is about."""
+        """The name of the file."""
         return self.name
 
     @property

@@ -58,7 +58,7 @@ Value = None | bool | int | float | str | Measured | Interval | Verdict | Name
 
 @dataclass(frozen=True)
 class Column:
-    """What the values of a column are and how many digits of them are shown."""
+    """A column: the description of its values, and how many digits are shown."""
 
     key: str  #: of the values in a row, and the name of the column in CSV
     heading: str

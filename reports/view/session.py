@@ -52,7 +52,7 @@ _GOES_ON = 64  # frames drawn of a still scene where each builds on the last
 
 
 class Session:
-    """What is shown, to whom, and what they asked for."""
+    """The state of the view: the page, its wishes, and the frame that it shows."""
 
     def __init__(self, state: ViewState, variant: str) -> None:
         self._given = state
@@ -79,7 +79,7 @@ class Session:
         self._in_motion: list[ViewError] = []
         self._shader = self.live.shader_stamp()
 
-    # What the server's threads call -----------------------------------------------------------------------------------
+    # Called by the server's threads -----------------------------------------------------------------------------------
 
     def opened(self, page: Page) -> None:
         """Show this page what there is from now on, and no other."""
@@ -248,7 +248,7 @@ class Session:
         if kernel and ":" in str(kernel) and kernel != own.kernel:
             raise InputError(f"kernel: got {kernel!r}, wanted one that is built in, or that of the command line")
 
-    # What the page is told --------------------------------------------------------------------------------------------
+    # Messages to the page ---------------------------------------------------------------------------------------------
 
     def _open(self, page: Page) -> None:
         page.tell(
