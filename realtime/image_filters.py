@@ -102,7 +102,7 @@ def weight(exponent: Any) -> Any:
     return exp2_bounded(dr.maximum(exponent, _FAINTEST))
 
 
-#: What stands in the margin of a guide: unlike all pixels.
+#: Value in the margin of a guide: unlike all pixels.
 _UNLIKE = 1e15
 
 

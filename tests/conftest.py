@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-# What a shell starts in the background ignores Ctrl-C, and so would the commands that tests interrupt.
+# A process that a shell starts in the background ignores Ctrl-C, and so would the commands that tests interrupt.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -32,7 +32,7 @@ def variant() -> str:
         import drjit as dr
 
         dr.set_thread_count(max(1, len(os.sched_getaffinity(0)) // int(os.environ["PYTEST_XDIST_WORKER_COUNT"])))
-    # What was imported stays: `_nothing_left_behind` need not look through it after every module.
+    # Imported modules stay: `_nothing_left_behind` need not look through them after every module.
     gc.collect()
     gc.freeze()
     return chosen

@@ -37,7 +37,7 @@ def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
     moved = {move.what: move for move in moves if move.label == plain.label}
     assert moved["airlight relative_bias"].new == pytest.approx(1e-3, rel=1e-3)
     assert {"airlight relative_rmse", "airlight p50", "airlight p99", "airlight max"} <= set(moved)
-    # What was not measured is missed too.
+    # Configurations that were not measured are missed, too.
     assert {move.what for move in moves if move.label != plain.label} == {"a baseline without its configuration"}
 
 

@@ -25,7 +25,7 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1)
     return "\n".join("| " + " | ".join(row) + " |" for row in [headers, rule, *rows]) + "\n"
 
 
-#: What the functions of `import airlight` return.
+#: Results of the functions of `import airlight`.
 _RESULTS = (
     "reports.api.results.Rendering",
     "reports.api.results.Reference",

@@ -46,7 +46,7 @@ def _of_method(method: str, kind: str) -> dict[str, Any] | None:
 def _caption(present: dict[str, dict[str, Any]]) -> str:
     rendered, error = present["method"], present.get("error")
     if error is None:
-        return f"What it renders, `{rendered['command']}`."
+        return f"Rendered by `{rendered['command']}`."
     text = (
         f"what it renders, `{rendered['command']}`, and its error: blue where it is too dark, red where it is too "
         f"bright, white below 1e-4 of the reference, full colour from 1 on; relative RMSE "

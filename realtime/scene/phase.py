@@ -387,7 +387,7 @@ PHASES: tuple[type[Phase], ...] = (
 #: |g| by which rules for Henyey and Greenstein's function are judged, beside 0: of more they reach as far.
 _SHARP = 0.95
 
-#: What rules may leave where a table leaves more between its entries.
+#: Errors that rules may leave where a table leaves more between its entries.
 _LEFT_TABLE, _LEFT_DROPLETS = 1e-3, 1e-5
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from analytic.errors import InputError
 
-#: What the system says when a disk is full, a quota used up, or a file larger than allowed.
+#: Errors of the system when a disk is full, a quota used up, or a file larger than allowed.
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 _HIDDEN = re.compile(r"\..*-[0-9a-f]{32}(\.\w+)?")  # the names of unfinished files

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-#: Of the scene: one scattering or reflection, no limit on values, means over pixels, linear values.
+#: Properties of the scene: one scattering or reflection, no limit on values, means over pixels, linear values.
 _SCENE: dict[str, Any] = {
     "render.engine": "CYCLES",
     "unit_settings.scale_length": 1.0,
@@ -37,7 +37,7 @@ _SCENE: dict[str, Any] = {
     "view_settings.exposure": 0.0,
     "view_settings.gamma": 1.0,
 }
-#: Of a file that holds what was rendered.
+#: Properties of the rendered file.
 _FILE = {"file_format": "OPEN_EXR", "color_mode": "RGB", "color_depth": "32", "exr_codec": "ZIP"}
 _LAYERED_FILE = {"media_type": "MULTI_LAYER_IMAGE", "color_depth": "32", "exr_codec": "ZIP"}
 _PHASES = {"isotropic": "HENYEY_GREENSTEIN", "hg": "HENYEY_GREENSTEIN", "rayleigh": "RAYLEIGH"}

@@ -19,7 +19,7 @@ from validation.study.row import PROPERTY
 
 COUNT = 10  #: worst scenes of a configuration
 
-#: What may be wrong with an image: its name, the column that counts the pixels, and in words.
+#: Possible faults of an image: name, the column that counts the pixels, and a description.
 CHECKS = (
     ("not finite", "error.nonfinite", "pixels of the airlight that are NaN or infinite"),
     ("surface not finite", "surface_error.nonfinite", "pixels of the lit surfaces that are NaN or infinite"),

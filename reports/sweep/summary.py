@@ -28,7 +28,7 @@ from validation.statistics.samples import LEVEL, binomial_interval, quantile_int
 
 SCHEMA = "airlight-sweep/1"
 
-#: What made the rows, by column.
+#: Columns of the software and hardware that made the rows.
 _VERSIONS = ("airlight", "source", "mitsuba", "drjit", "python", "variant", "host", "device")
 
 

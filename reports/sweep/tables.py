@@ -93,7 +93,7 @@ def correlations_table(said: Summary) -> Table:
         for label, chosen in said.strongest.items()
         for each in chosen
     ]
-    return table("What goes with the error", columns, rows)
+    return table("Correlations with the error", columns, rows)
 
 
 def refusals_table(said: Summary) -> Table:

@@ -24,7 +24,7 @@ from validation.columns import columns_of
 from validation.metrics.errors import Metrics
 from validation.timing import FrameTimes, Timing
 
-#: What is timed of a frame, by its name in report.json.
+#: Times of a frame, by their names in report.json.
 TIMES = tuple(meanings(FrameTimes))
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 

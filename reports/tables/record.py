@@ -110,7 +110,7 @@ class Result:
 class Said(Result):
     """A result that is worked out as a whole."""
 
-    name: str  #: what it is about
+    name: str
     data: Any = None  #: as JSON has them
     claims: Sequence[str] = ()
     tables: Sequence[Table] = ()
@@ -121,7 +121,7 @@ class Said(Result):
 
     @property
     def title(self) -> str:
-        """The name of the file."""
+        """The name of the result."""
         return self.name
 
     @property

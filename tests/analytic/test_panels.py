@@ -202,7 +202,7 @@ def test_three_forms_are_one_integral(phase):
         expected, _ = airlight_segments(foot, height, x0, x0 + length, sigma_t, phase)
         for form, ends in forms:
             pieces = [quad(form, a, b, epsabs=0, epsrel=1e-12)[0] for a, b in pairwise(ends) if b > a]
-            # What the panels are asked for; the pieces are right to 1e-12.
+            # The tolerance of the panels; the pieces are right to 1e-12.
             assert sum(pieces) == pytest.approx(expected[0], rel=1e-10)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Closed forms for area lights: what scenes with a known answer are held against.
+r"""Closed forms for area lights: the known answers of scenes.
 
-**A sphere beside a ray, in unbounded fog of isotropic scattering.** A point at the distance d from the centre of a
+**A sphere next to a ray, in unbounded fog of isotropic scattering.** A point at the distance d from the centre of a
 sphere of radius R and radiance Le receives the fluence
 
     Phi = Le int exp(-sigma_t r) domega
@@ -18,9 +18,10 @@ ray at the height h over the centre, whose foot is at the distance `foot`, is
     L = albedo sigma_t/(4 pi) int_{x0}^{x1} exp(-sigma_t x) Phi(sqrt(h^2 + (x - foot)^2)) dx = albedo sigma_t/(4 pi) K.
 
 **How much of a flat light a surface point sees.** Seen from the point, an edge of an occluder falls on a line in the
-plane of the light, and a convex polygon on a convex polygon. Of a disk, a line at the signed distance u (in radii) from
-the centre leaves the fraction (acos u - u sqrt(1 - u^2))/pi; what a polygon covers is added up edge by edge as signed
-triangles and sectors. Of a rectangle, polygons are clipped (Sutherland, Hodgman 1974) and measured (Gauss's shoelace).
+plane of the light, and a convex polygon on a convex polygon. A line at the signed distance u (in radii) from the centre
+of a disk leaves the fraction (acos u - u sqrt(1 - u^2))/pi; the area that a polygon covers is added up edge by edge as
+signed triangles and sectors. On a rectangle, polygons are clipped (Sutherland, Hodgman 1974) and measured (Gauss's
+shoelace).
 """
 
 import math
@@ -45,8 +46,8 @@ def sphere_airlight(sigma_t: float, height: float, radius: float, *, foot: float
         Extinction [1/m].
     height
         Distance between the centre of the sphere and the ray, above `radius` [m].
-    radius
-        Of the sphere [m].
+        radius
+        Radius of the sphere [m].
     foot
         Distance along the ray at which it is closest to the centre [m].
     x0, x1

@@ -6,8 +6,8 @@ in Python, looked for in all functions of a package or module, whatever its form
 an underscore stands for any expression, the same one wherever it occurs. The code of the function that holds the
 expression is replaced, so every reference to the function sees the fault.
 
-What a hook or a pattern names must be there, and a pattern exactly as often as it says: a fault cannot vanish when code
-moves.
+The target of a hook or a pattern must exist, and a pattern must match exactly as often as it says: a fault cannot
+vanish when code moves.
 """
 
 import ast

@@ -32,8 +32,8 @@ from validation.estimates.agreement import batch_estimate, layer_masks, referenc
 from validation.scenes.loading import load_scene, resize
 from validation.statistics.comparison import compare_statistics
 
-#: Of the relative bias of quadrature against single-scatter, by stage: of airlight and surface [1]. Each fault that is
-#: found there leaves it in one of them.
+#: Margins of the relative bias of quadrature against single-scatter, by stage: of airlight and surface [1]. Each fault
+#: that is found on a stage exceeds one of them.
 MARGINS = {
     "many-lights": (5e-4, 5e-4),
     "two-pens": (5e-4, 5e-4),

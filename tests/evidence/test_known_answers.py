@@ -282,7 +282,7 @@ def lid(corners: np.ndarray, height: float):
 def test_what_a_polygon_leaves_of_a_light(variant, kind, corners):
     """A light at the height 4 over points at 0, where a polygon at the height 2 is in the way.
 
-    Of a disk a half plane leaves 1 - (acos u - u sqrt(1 - u^2))/pi, of a rectangle a triangle what clipping leaves.
+    A half plane leaves 1 - (acos u - u sqrt(1 - u^2))/pi of a disk; a triangle leaves the clipped area of a rectangle.
     """
     reference = reference_of(panel(kind))
     half = np.array([0.625, 0.375]) if kind == "rectangle" else np.full(2, 0.5)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claims: two estimators that agree as they are disagree over every injected fault of the physics of one of them.
 
-What all estimators share, the certified scenes find, although the estimators agree. So do both sides of the slab.
+The certified scenes find faults that all estimators share, although the estimators agree. The two methods
+for a slab, orders and walk, are tested in the same way.
 """
 
 import json
@@ -24,7 +25,7 @@ from tests.evidence.mutations import BELOW_THE_MARGIN, MUTATIONS, SHARED
 from validation.certified.files import certified_data
 from validation.slab import moments
 
-#: What the default tier tries beside the faults of the quadrature on its stages: 32 batches and kernels of their own.
+#: Faults that the default tier tries besides those of the quadrature on its stages: 32 batches and their own kernels.
 QUICK = ("traced-shadow-epsilon",)
 QUICK_STAGES = ("many-lights", "two-pens")
 ESTIMATORS = ("quadrature", "single-scatter")

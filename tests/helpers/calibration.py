@@ -70,7 +70,7 @@ class Experiment:
     seed: int = 1  #: of the random numbers
 
 
-#: What each rate of `calibrate` must be; `exceeding_alarms` at most that, as a count is discrete.
+#: Expected rates of `calibrate`; `exceeding_alarms` may be lower, as a count is discrete.
 EXPECTED = {
     "pixel_alarms": LEVEL,  # with a pixel rejected at Sidak's level
     "block_alarms": LEVEL,

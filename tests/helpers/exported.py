@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What exported kernels err by; `python -m tests.helpers.exported` measures it for the heads of exported texts."""
+"""Errors of exported kernels; `python -m tests.helpers.exported` measures them for the heads of exported texts."""
 
 import json
 

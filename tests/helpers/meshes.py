@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tests of scenes ask of a mesh: its edges, whether it is closed, its volume and areas."""
+"""Properties of meshes for tests of scenes: edges, whether a mesh is closed, its volume and areas."""
 
 from collections import Counter
 

@@ -50,7 +50,7 @@ class Page(HTMLParser):
             self.words.append(data)
 
     def addresses(self):
-        """What tags refer to: pairs of tag and address."""
+        """Addresses in tags: pairs of tag and address."""
         names = ("src", "href", "xlink:href", "data", "poster", "srcset", "action")
         found = ((tag, attributes.get(name)) for tag, attributes in self.tags for name in names)
         return [(tag, address) for tag, address in found if address is not None]

@@ -2,8 +2,8 @@
 """Small scenes that hold what the built-in scenes lack, for checks of the checks.
 
 `many-lights` has several lights, one of them a soft spot and one behind the camera, in coloured, backward scattering
-fog. Each built-in scene has one light, without a soft edge and before the camera, and no fog scatters backward. So only
-this scene can reveal a fault in the formula for soft spots or in the sum over lights.
+fog. Each built-in scene has one light, without a soft edge and before the camera, and no fog scatters backward. Only
+this scene can therefore reveal a fault in the formula for soft spots or in the sum over lights.
 
 `wide-lights`, in `WIDE_PROBES`, has area lights of each shape, black ones and one of material `null`, some in
 view, before occluders. Plates before the disk hide the corners of a square around it, whose light would nearly be that

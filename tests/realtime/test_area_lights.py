@@ -38,7 +38,7 @@ def test_points_lie_on_the_light_and_share_its_power(kind, pattern, points):
         np.testing.assert_allclose(from_middle @ light.normal, 0, atol=1e-12)
         u, v = (from_middle @ side / (side @ side) for side in (light.across, light.up))
         assert np.all(np.maximum(np.abs(u), np.abs(v)) < 1 if kind == "rectangle" else np.hypot(u, v) < 1)
-    # Of each point the power is pi I0.
+    # The power of each point is pi I0.
     np.testing.assert_allclose(points * np.pi * placed.intensity, light.power, rtol=1e-12)
     assert len(np.unique(placed.positions.round(9), axis=0)) == points
 
@@ -104,7 +104,7 @@ def test_a_sphere_is_closed_and_nearly_as_large():
     assert volume(vertices - MIDDLE, faces) == pytest.approx(4 / 3 * np.pi * light.radius**3, rel=5e-3)
 
 
-# What is read, and what is refused by the name of the shape ----------------------------------------------------------
+# Reading, and refusals by the name of the shape ----------------------------------------------------------------------
 
 
 def read(**changes):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What work may use is the least of the machine's memory and its containers' limits, and with CUDA the GPU's."""
+"""Work may use the least of the machine's memory and its containers' limits, and with CUDA the GPU's."""
 
 import os
 

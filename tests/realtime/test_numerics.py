@@ -63,7 +63,7 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
     function = Frozen(doubled)
     arguments = [dr.opaque(mi.Float, value, 5) for value in (1.0, 2.0, 3.0)]
     assert [float(function(argument)[0]) for argument in arguments] == [2, 4, 6]
-    # What the function names of its surroundings is among its inputs: the list changes, and it is recorded again.
+    # Names that the function takes from its surroundings are inputs: the list changes, and it is recorded again.
     assert seen == [False] * function.n_recordings
     assert seen
 

@@ -277,6 +277,6 @@ def test_exact_integrates_the_cosine(variant, rays, isotropic):
     assert np.all(double[~lit] == 0)
     np.testing.assert_allclose(integrals(rays, "quadrature", "double", isotropic)[lit], values[lit], rtol=1e-4)
     error = np.abs(integrals(rays, "exact", "single", isotropic)[lit] / values[lit] - 1)
-    # What remains of a segment next to the plane is known as badly as its ends.
+    # The rest of a segment next to the plane is only as accurate as its ends.
     assert np.median(error) < 3e-7
     assert np.quantile(error, 0.9) < 2e-6

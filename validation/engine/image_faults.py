@@ -45,7 +45,7 @@ def _vignette(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     return replace(guess, values=(*guess.values, lambda radiance: radiance * attenuated))
 
 
-#: What is said of an image that is turned, and what undoes it: itself.
+#: Names of the turns of an image, and their inverses: each is its own.
 TURNS: tuple[tuple[str, Callable[[Array], Array]], ...] = (
     ("upside down (flip it vertically)", lambda image: image[::-1]),
     ("mirrored left to right (a left-handed camera or an axis of the scene)", lambda image: image[:, ::-1]),

@@ -20,7 +20,7 @@ from reference.storage.exr import TOTAL, Attribute, Image
 
 Array = NDArray[np.float64]
 
-#: What must be the same in all files: the header's name, and what it means.
+#: Headers that must be the same in all files, and their meanings.
 _SAME = {
     "scene_digest": "the scene or its size",
     "estimator": "the estimator",

@@ -69,8 +69,8 @@ class Places:
     light: Array  #: length in each medium between light and place, (n, media) [m]
     medium: Index  #: number of the medium that scatters there; of surfaces nothing, (0,)
     cosine: Array  #: of the scattering angle; of surfaces nothing, (0,)
-    #: Of a node the length of ray that it stands for times the profile of the light, (n, 1) [m]; of a surface what it
-    #: sends to the camera where nothing attenuates it, (n, 3) [W/(m^2 sr)].
+    #: For a node, the length of ray that it stands for times the profile of the light, (n, 1) [m]; for a surface, the
+    #: radiance to the camera without attenuation, (n, 3) [W/(m^2 sr)].
     value: Array
 
     @staticmethod

@@ -25,7 +25,7 @@ VERDICTS = REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not 
 EFFORTS = ("quick", "default", "full", "paper")
 DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
 
-#: What an experiment gives: by name a number, a number with the ends of its interval, or why there is none.
+#: Results of an experiment: by name a number, a number with the ends of its interval, or why there is none.
 Figures = Mapping[str, Any]
 #: A measured number with the ends of the interval of its noise.
 Figure = tuple[float, float, float]

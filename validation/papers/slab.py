@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 THICKNESSES = (50.0, 100.0, 300.0, 1000.0)  #: [m]
 _SUNS = (0.0, 75.0)  # [degrees]
 _FIGURE_3 = (1000.0, 100.0, 75.0)  # thickness [m], depth [m] and sun [degrees] of its left part
-#: What is compared with the droplets, by thickness [m].
+#: Phase functions that are compared with the droplets, by thickness [m].
 _REFLECTANCES: Mapping[float, tuple[str, ...]] = {
     50.0: ("printed", "modified", "half", "printed g"),
     300.0: ("printed", "matched g"),

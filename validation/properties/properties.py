@@ -20,7 +20,7 @@ _GRID = (32, 24)  # rays across and down the image
 _STEPS = 8  # points on each ray
 _COSINES = 4096
 
-#: What they are called.
+#: Names of the properties for readers.
 PROPERTIES: Mapping[str, str] = {
     "lights": "number of lights",
     "points": "number of point lights",

@@ -43,7 +43,7 @@ Exit = tuple[float | None, float | None, float | None]  # light through a plane:
 STREAMS = (64, 96, 128)
 _RESOLVED = 1e-4
 _NODES = 8
-#: What a row is of, not a number of the light.
+#: Keys of a row that identify it and are no numbers of the light.
 _GIVEN = ("orders", "depth", "mu", "phi")
 #: A scattering of a photon [s], measured on one thread of an AMD EPYC.
 _SCATTERING = 0.4e-6

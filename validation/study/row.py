@@ -21,7 +21,7 @@ from validation.metrics.flip import Flip
 from validation.metrics.other_tools import PublishedErrors
 from validation.timing import FrameTimes, Timing
 
-#: What came of a cell. 'done': numbers; 'refused': the method, or the reference, says that it cannot do this scene, and
+#: Outcomes of a cell. 'done': numbers; 'refused': the method, or the reference, says that it cannot do this scene, and
 #: `reason` why; 'left out': a frame would take too long; 'failed': an exception; 'hung': stopped at the time limit;
 #: 'aborted': its process died every time.
 STATUSES = ("done", "refused", "left out", "failed", "hung", "aborted")

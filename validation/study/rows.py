@@ -18,7 +18,7 @@ from validation.study.row import COLUMNS, arrow_schema, property_names
 
 ROWS, PARQUET, JSON = "rows.sqlite", "sweep.parquet", "sweep.jsonl"  #: files of the folder of a study
 
-#: Of every configuration, so many of the worst rows by each of `_WORST_BY` keep their pictures in the Parquet.
+#: Number of the worst rows of a configuration, by each of `_WORST_BY`, that keep their pictures in the Parquet.
 PICTURES = 12
 _WORST_BY = ("error.relative_rmse", "error.p99", "error.max")
 

@@ -418,7 +418,7 @@ def _checks(what: str, value: Any) -> Checks:
 _seconds = partial(read_number, least=0, most=_LONGEST, whole=False)
 _count = partial(read_number, least=0, most=_MOST_SCENES)
 
-#: What reads the values of a study file, of what is measured in it, and of how its references are checked.
+#: Readers of the values of a study file: of the study, its measurements, and the checks of its references.
 _STUDY: Mapping[str, Reader] = {
     "name": read_word,
     "half": several(read_word, 0),

@@ -13,7 +13,7 @@
     direction    asin(mu)/pi + 1/2
     azimuth      phi/pi
 
-**What an order does by itself.** With n the first order of a set and m the mean of its orders, each less 1,
+**The effect of an order by itself.** With n the first order of a set and m the mean of its orders, each less 1,
 
     r = n log(t/(t + 0.02)) + m log(1 + d/m) - d        (31-inf: the first term alone):
 

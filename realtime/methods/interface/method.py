@@ -153,10 +153,10 @@ def camera_view(
     return View(**vars(rays), distance=distance, lights=tuple(lights), medium=medium, **own)
 
 
-#: What of a scene may change from frame to frame; `look` is all that moves nothing: the medium and the lights' colours.
+#: Parts of a scene that may change between frames; `look` is all without motion: the medium and the lights' colours.
 MOVABLE = ("camera", "geometry", "light", "look")
 
-#: What runs before a frame when things moved: a function of the scene as it is now that returns the method's state.
+#: Preparation of a frame when things moved: a function of the present scene that returns the method's state.
 Preparation = Callable[[Scene], Any]
 
 #: A cause of errors, and the values of parameters with which it is gone; None: all that the method has left.

@@ -37,7 +37,7 @@ def integrate_certified(
     Parameters
     ----------
     foot, height, x0, x1, sigma_t, phase
-        Of the segment [m] and the medium [1/m], x1 may be infinite; binary numbers, taken as exact.
+        The segment [m] and the medium [1/m]; x1 may be infinite; binary numbers, taken as exact.
     digits
         Relative precision in decimal digits, at least 15: for less the float64 routes are the right tool.
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a certified fog scene consists of, how Mitsuba reads it, and the twelve scenes of the file.
+"""The parts of a certified fog scene, how Mitsuba reads it, and the twelve scenes of the file.
 
 Every number is exact in float32, so that renderers in single precision render the very scene that was certified:
-coordinates are multiples of 1/1024 m, which makes the corners of boxes exact as well. What cannot be exact is a
-rotation; the matrices of cameras and spots are those of the file, and count as given. Occluders are black, hence all
-light in an image is airlight.
+coordinates are multiples of 1/1024 m, which makes the corners of boxes exact as well. Rotations cannot be exact; the
+matrices of cameras and spots are those of the file, and count as given. Occluders are black, hence all light in an
+image is airlight.
 """
 
 import json

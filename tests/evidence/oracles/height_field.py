@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the oracle of light volumes is made of: the height field of a shadow map in float64, and rays over a face.
+"""Parts of the oracle of light volumes: the height field of a shadow map in float64, and rays over a face.
 
 See `tests.evidence.oracles.light_volume` for the derivation.
 """

@@ -3,8 +3,8 @@
 
 `realtime.shadow_maps.shadow_map` says what a shadow map holds and `realtime.shadow_maps.inverse_depth_field` what
 height field it makes: linear in s = 1 / planar depth over the halves of the texels of a face, lit where the s of a
-point is above it. Of these two the oracle takes the distances as they are; the rest is done again here, in other
-variables than those of the methods.
+point is above it. The oracle takes only the distances of the map; the rest is derived again here, in other variables
+than in the methods.
 
 **The ray.** Let n be the unit vector from the light to the foot point of a ray, w its direction, theta the angle at the
 light (`analytic.geometry`). The point at theta is h n + h tan(theta) w away from the light: the direction there is
@@ -32,8 +32,8 @@ is one sum of cos(theta) and sin(theta). From f1 and f2 at theta1 and theta1 + d
 
 which changes sign once at most, where tan(e) = f1 sin(delta) / (f1 cos(delta) - f2).
 
-What is lit of a ray, faces and cones of spots taken into account, is integrated like the lit intervals of the reference
-(`reference.quadrature.stretches`): the oracle differs from that by what the shadow map leaves out, and by nothing else.
+The lit parts of a ray, clipped to faces and cones of spots, are integrated like the lit intervals of the reference
+(`reference.quadrature.stretches`): the oracle differs from the reference only by the errors of the shadow map.
 """
 
 from collections.abc import Sequence
@@ -156,7 +156,7 @@ def _lit_parts(field: HeightField, face: int, path: Path, ends: tuple[Array, Arr
     f1, f2 = np.abs(f[row, column]), np.abs(f[row, column + 1])  # of opposite signs
     delta = theta[row, column + 1] - theta[row, column]
     crossing = theta[row, column] + np.arctan2(f1 * np.sin(delta), f1 * np.cos(delta) + f2)
-    # Of each ray, what opens and what closes its intervals take turns, so that both lists go by the same intervals.
+    # Beginnings and ends of the intervals of a ray take turns, so that both lists go by the same intervals.
     opens = lit[row, column + 1]
     first, last = np.flatnonzero(lit[:, 0]), np.flatnonzero(lit[:, -1])
     ray, begin = by_ray(first, ends[0][first], row[opens], crossing[opens])

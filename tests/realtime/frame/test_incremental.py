@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a frame keeps of the last one, and large images in parts: the same images, bit by bit."""
+"""Parts that a frame keeps of the last one, and large images in parts: the same images, bit by bit."""
 
 from dataclasses import dataclass, replace
 
@@ -33,7 +33,7 @@ from validation.study.frame_times import timed_image
 
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
-#: What moves from frame to frame; together every pair of neighbours that matters.
+#: Motion from frame to frame; together every pair of neighbours that matters.
 STEPS = ("light", "medium", "colour", "camera", "light", "objects", "colour", "light", "objects", "camera", "medium")
 
 
@@ -194,7 +194,7 @@ def same(frame, other):
 
 @pytest.mark.parametrize("name", IN_PARTS)
 def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch):
-    """What is shaded again by a frame that follows is shaded in parts too; the state is one for all parts."""
+    """A later frame that is shaded again is shaded in parts too; all parts share one state."""
     made = renderer_of_parts(name)
     read, turn = made.scene, rotation([0.3, 0.9, -0.2], 11.0)
     turned = replace(read, lights=tuple(turned_light(light, np.array([0.1, 0.2, 0.3]), turn) for light in read.lights))

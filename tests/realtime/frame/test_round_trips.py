@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a GPU needs of a frame: no wait for the host but those of a table; no GPU is asked, every wait is counted."""
+"""Frames wait for the host only as a table says, as a GPU needs it; every wait is counted, without a GPU."""
 
 import traceback
 from collections import Counter

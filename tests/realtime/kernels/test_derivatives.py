@@ -73,7 +73,7 @@ def test_derivatives_of_the_default_are_exact(variant, rows, phase):
         slopes = np.array([float(row[f"d{name}"]) for row in own])
         size = np.maximum(np.abs(inputs[number]), 1e-3)
         scale = np.maximum(np.abs(slopes), 0.1 * value / size)
-        # What float32 and float64 derivatives must keep; found: 4e-6 and 4e-15.
+        # Limits of float32 and float64 derivatives; found: 4e-6 and 4e-15.
         for precision, limit in (("single", 1e-4), ("double", 1e-8)):
             found = forward(KERNELS["exact"].function, phase, inputs, number, precision)
             assert np.max(np.abs(found - slopes) / scale) < limit, (name, precision)

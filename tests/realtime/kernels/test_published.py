@@ -27,7 +27,7 @@ pytestmark = pytest.mark.usefixtures("variant")
 N = 2147483673
 taylor_printed = partial(taylor, printed=True)
 
-#: What the print has too much, before e^-a and before the division by the mean: DESIGN section 3, printed - derived.
+#: Excess of the printed terms, before e^-a and before the division by the mean: DESIGN section 3, printed - derived.
 EXCESS = {
     ("isotropic", 2): lambda a: (a**2 - a) / 2,
     ("isotropic", 3): lambda a: -2 * a / 3,

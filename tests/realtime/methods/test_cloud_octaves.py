@@ -161,7 +161,7 @@ def test_methods_for_fog_refuse_clouds_and_skies_and_name_who_takes_them(name):
 
 
 def test_frames_after_the_sun_moved_and_the_cloud_thickened():
-    """What was recorded once serves for all, with its layers."""
+    """One recording serves all frames, with their layers."""
     read = read_scene(loaded(sun=SUN, sky=SKY, ring=cloud("ring", ring())))
     renderer = frame_renderer(read, OCTAVES, extra_layers=True)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}

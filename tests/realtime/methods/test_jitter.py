@@ -16,7 +16,7 @@ from tests.helpers.frames import reference_of, renderer
 from tests.helpers.scenes import spot, tiny_scene
 
 SIZE, RUNS = (16, 12), 64
-#: Of five tests each: one right method in 2000 is called biased.
+#: Level of each of five tests: one right method in 2000 is called biased.
 LEVEL = 1e-4
 CASES = {
     "march-white": ("ray-march", {"steps": 3, "jitter": "white"}),

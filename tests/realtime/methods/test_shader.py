@@ -53,7 +53,7 @@ def _fog(g: float) -> dict:
     return {"fog": fog | {"phase": {"type": "hg", "g": g}}}
 
 
-# What it is given -----------------------------------------------------------------------------------------------------
+# Inputs ---------------------------------------------------------------------------------------------------------------
 
 
 def test_rays_are_those_of_the_camera_row_by_row_and_by_their_place_in_the_image(drawn):

@@ -91,7 +91,7 @@ def _draws(count, seed):
 
 
 def test_a_mesh_of_a_quad_is_the_rectangle_and_of_a_sphere_the_sphere(variant):
-    """What an icosphere of 1280 triangles sends is that of its area, 0.5 % below that of the sphere around it."""
+    """An icosphere of 1280 triangles emits in proportion to its area, 0.5 % below that of the sphere around it."""
     quad = grid((-0.5, -0.3, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.0), (1, 1))
     turn = np.array(turned((0.0, 0.0, 0.0), 163, (1, 1, 1)).matrix, dtype=np.float64)[:3, :3]
     fine = placed(scaled(icosphere(3), 0.4), (0.3, 0.4, 2.9))
@@ -221,7 +221,7 @@ def test_surfaces_by_many_shadow_rays(variant, kind):
     scale = expected.mean()
     # Student's value with seven degrees of freedom that one value in 100 000 exceeds; 1e-5: the rays' start.
     assert np.all(np.abs(difference) <= 9.1 * error + 1e-5 * scale)
-    # Of a mesh half of the even points face away.
+    # Half of the even points of a mesh face away.
     assert np.sqrt(np.mean(error**2)) < (0.07 if kind == "mesh" else 0.02) * scale
 
 

@@ -138,7 +138,7 @@ def test_surfaces_are_darkened_by_both_segments(variant, light):
 
 @pytest.mark.claim("bounded-media", tolerance="1e-8 relative")
 def test_camera_inside_of_a_body(variant):
-    """What the camera in the box sees through its own medium: the same integral with the chord cut at 0."""
+    """A camera in the box sees through the box's medium: the same integral with the chord cut at 0."""
     scene = clear_scene(size=(12, 9), brick=brick(), pearl=pearl())
     to_world = mi.ScalarTransform4f().look_at([-0.6, 0.0, 0.7], [0.1, 0.3, 0.6], [0, 0, 1])
     inside = scene["brick"].pop("interior") | {"id": "mist"}

@@ -67,7 +67,7 @@ def fog(**entries: Any) -> dict[str, Any]:
     return tiny_scene(fog=tiny_scene()["fog"] | entries)
 
 
-#: What both sides refuse, and words of both messages.
+#: Scenes that both sides refuse, and words of both messages.
 BOTH = [
     (lambda: tiny_scene(lamp=None), "no light; wanted"),
     (lambda: tiny_scene(lamp=None, sky={"type": "constant"}), "light 'sky'"),
@@ -95,7 +95,7 @@ BOTH = [
     (lambda: lit("sphere", size=0.3, material={"type": "null"}, interior=FOG), "light 'lamp'.* bounds a medium"),
     (lambda: lit("rectangle", **radiance(texture())), "light 'lamp'.* textur"),
 ]
-#: What the methods alone refuse.
+#: Scenes that only the methods refuse.
 METHODS = [
     (lambda: fog(sigma_t=-1.0), "sigma_t is"),
     (lambda: fog(sigma_t=float("nan")), "sigma_t is"),

@@ -40,7 +40,7 @@ def test_round_trip_is_exact(tmp_path, image):
     np.testing.assert_array_equal(back.layers["total"], image.layers["airlight"] + image.layers["surface"])
     np.testing.assert_array_equal(back.depth, image.depth)
     assert dict(back.attributes) == dict(image.attributes)
-    # What was read can be written again, total included.
+    # An image that was read can be written again, total included.
     write_exr(tmp_path / "b.exr", back)
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 

@@ -112,7 +112,7 @@ def _with_root():
 
 
 def test_times_are_those_of_computing_and_never_of_loading():
-    """What is made from kept results took as long as they once did."""
+    """The time of a result includes the original times of the cached results that it uses."""
     store("reference-a", {"a": 1}, Spent(100.0, 150.0))
 
     @kept("method")
@@ -222,7 +222,7 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
     assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest(key_of)]
 
 
-#: What computes some kinds of what is kept, and a module of which each takes numbers.
+#: Cached functions by kind, and a module on whose numbers each depends.
 COMPUTED = {
     "quadrature": (quadrature_image, "reference.quadrature.segments"),
     "volpath": (volpath_batch, "reference.scene.read"),

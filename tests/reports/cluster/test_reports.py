@@ -13,7 +13,7 @@ from reports.report.measure import write_report
 from validation.study.configuration import configuration
 from validation.study.study import Checks, Measure, Study
 
-#: What is measured by the clock or of the memory, and how much of it was there before: a cluster leaves the references.
+#: Entries that depend on the clock, the memory or the cache: a cluster leaves the references.
 TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims", "memory", "cost"}
 TIMES |= {"cached", "computed"}
 

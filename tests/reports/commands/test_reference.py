@@ -35,7 +35,7 @@ def traced(variant, monkeypatch):
     def trace(reference, seed, samples, **options):
         if seed in stops:
             raise KeyboardInterrupt
-        # Of one pixel the standard deviation is its mean, so that the image is known to 1/sqrt(144 batches).
+        # The standard deviation of a pixel is its mean, so that the image is known to 1/sqrt(144 batches).
         return single_batch(seed, samples, np.random.default_rng([seed, samples]).exponential(size=(2, 48, 3)))
 
     monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", trace)

@@ -59,7 +59,7 @@ def mine(tmp_path, monkeypatch):
 
 @pytest.fixture
 def handed_on(monkeypatch):
-    """What the command hands to `write_report`."""
+    """The arguments that the command hands to `write_report`."""
     given = {}
 
     def write(folder, study, **options):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the user's code does in a process of its own: nothing of it ends the command or gets into its output."""
+"""The user's code in a separate process: it can neither end the command nor get into its output."""
 
 import os
 import subprocess

@@ -9,7 +9,7 @@ from tests.helpers.reports import refused as refused_entry
 
 
 def method(label, rmse, median, *, refused=None):
-    """What a report says of a configuration."""
+    """The entry of a configuration in a report."""
     return refused_entry(label, refused) if refused else entry(label, rmse, median)
 
 

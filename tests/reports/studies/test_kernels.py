@@ -121,7 +121,7 @@ QUICK = {
 @pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
 @pytest.mark.parametrize("name", QUICK)
 def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path, monkeypatch):
-    """What is embedded are TrueType fonts, no date."""
+    """TrueType fonts are embedded, and no date."""
     monkeypatch.setattr("validation.kernels.benchmark.RAYS", 3000)
     found = airlight.study(name, **QUICK[name])
     first = found.save(tmp_path / "first.pdf", "single").read_bytes()

@@ -56,7 +56,7 @@ TRIES = {
 @pytest.mark.claim("sweep-tries")
 @pytest.mark.parametrize("case", TRIES)
 def test_what_is_tried_and_within(sweep_of, case):
-    """What is undecided widens the interval on one side."""
+    """Undecided scenes widen the interval on one side."""
     scenes, counted = TRIES[case]
     (sample,) = samples(sweep_of([row(f"random:{n}", **changes) for n, changes in enumerate(scenes)]))
     made = claim(sample, 1e-3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page asks for is shown, mistakes are one line, and the command on the page makes the same image.
+"""The view shows what the page asks for, mistakes are one line, and the command on the page makes the same image.
 
 The reference is computed by a stand-in in this process, and at once; one slow test has the process.
 """

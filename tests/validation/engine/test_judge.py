@@ -173,10 +173,10 @@ SIZE = (80, 60)
 
 @pytest.fixture(scope="module", params=["open-fog", pytest.param("sphere-spot", marks=pytest.mark.slow)])
 def traced(request, variant, tmp_path_factory):
-    """What a path tracer with a box filter makes of a scene: means over pixels, with its noise.
+    """The image of a path tracer with a box filter: means over pixels, with its noise.
 
-    Every value has Gaussian noise of 2 %, those beside the lamp of 30 %, as LuxCore's had at 512 paths a pixel, and the
-    pixel of the lamp is twice as bright as it should be: its variance is infinite.
+    Every value has Gaussian noise of 2 %, values next to the lamp of 30 %, as LuxCore's had at 512 paths a pixel, and
+    the pixel of the lamp is twice as bright as it should be: its variance is infinite.
     """
     expected = reference_image(load_scene(request.param, SIZE).scene, pixel="area")
     total = reference_layer(expected, "total")

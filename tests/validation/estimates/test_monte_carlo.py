@@ -352,7 +352,7 @@ def test_time_budget_never_starts_a_batch_that_would_end_too_late(loaded):
     assert [fraction for fraction, _ in told] == pytest.approx([n / 10.5 for n in range(1, 11)])
     assert reference.reached is None
     again, told = run(loaded, Budget(seconds=3.2))
-    # What is kept costs no time.
+    # Cached batches cost no time.
     assert (again.cached, again.image.attributes["airlight:batches"]) == (10, 13)
     assert len(told) == 3
 

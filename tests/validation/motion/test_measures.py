@@ -150,7 +150,7 @@ def test_without_a_change_of_the_reference_no_lag_is_told():
     assert found.ghost.value is None
     assert motion_verdict(found).kind == "cannot be told"
     floor = 0.1 * math.sqrt(WEIGHT / (2 - WEIGHT))
-    # Of forty frames the mean variance after the reset is larger than at the floor by sum of 0.81^n/40 = 0.13 parts.
+    # Over forty frames the mean variance after the reset exceeds the floor by the fraction sum of 0.81^n/40 = 0.13.
     ratio = WEIGHT / (2 - WEIGHT)
     expected = floor * math.sqrt(np.mean([1 + 0.81**n * (1 / ratio - 1) for n in range(FRAMES)]))
     assert found.relative_rmse.value == pytest.approx(

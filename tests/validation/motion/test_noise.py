@@ -91,7 +91,7 @@ def test_a_heavy_tail_is_not_taken_for_a_bias():
     assert np.mean([np.prod(np.sign(each.bias_ci)) > 0 for each in found]) > 0.12  # by Student; 0.27 of 400
     assert np.mean([each.words.startswith("a bias") for each in found]) <= 0.05
     assert "cannot be told" in found[0].words
-    # Of skewed noise with a variance a bias at its detectable size is found as often as without a look at the tail.
+    # In skewed noise with a variance a bias of detectable size is found as often as without a look at the tail.
     exponential = random.exponential(size=(trials, runs, 24, 32))
     bias = detectable(runs) / math.sqrt(768)
     skewed = [said(each) for each in exponential - bias]

@@ -144,7 +144,7 @@ def test_a_lamp_on_a_box_is_its_six_sides(load):
 
 
 def test_a_lamp_that_reflects_is_lit_like_any_surface(load):
-    """What it sends out changes nothing of what it reflects; it lights what is before it as a black one does."""
+    """Its emission does not change its reflection; it lights the scene like a black lamp."""
     rgb = '<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf></bsdf>'
     turned = shape("rectangle", "{}", at=(0.1, 0.9, 0.7)).replace("<rotate", '<rotate x="1" angle="90"/><rotate')
     plain = image(load(LAMP, turned.format(rgb.format("0.5, 0.4, 0.3"))))

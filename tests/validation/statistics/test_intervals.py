@@ -54,7 +54,7 @@ def test_quantile_of_a_hundred_by_hand():
     values = np.arange(1, 101)[::-1]
     # Binomial(100, 1/2): P(X <= 39) = 0.0176 < 0.025 <= P(X <= 40) = 0.0284; the same from above.
     assert quantile_interval(values, 0.5) == (50.0, 40.0, 61.0)
-    # Of a hundred the largest is not above the 99 % quantile often enough: the upper end is not known.
+    # The largest of a hundred is not above the 99 % quantile often enough: the upper end is not known.
     estimate, low, high = quantile_interval(values, 0.99)
     assert (estimate, high) == (99.0, None)
     assert low == 97.0
@@ -86,7 +86,7 @@ def test_rank_correlation_is_that_of_the_authors_own_program():
     tolerance="0.035 of the level: four standard errors of 2000 samples, and 0.015 of the approximation",
 )
 def test_rank_correlation_holds_the_true_one_about_as_often_as_it_says():
-    """Of two normal variables with the correlation c the true one is (6/pi) asin(c/2)."""
+    """The true rank correlation of two normal variables with the correlation c is (6/pi) asin(c/2)."""
     rng = np.random.default_rng(5)
     for c in (0.0, 0.5, 0.8):
         reference, held = 6 / np.pi * np.arcsin(c / 2), 0

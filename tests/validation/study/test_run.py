@@ -128,7 +128,7 @@ def test_a_row_of_a_noisy_method_has_the_errors_of_its_runs():
 @pytest.mark.claim("refusals-stand-in-the-report")
 @pytest.mark.usefixtures("variant")
 def test_a_refusal_is_a_row():
-    """What a method cannot do is a line of the table; one bad configuration must not end a report."""
+    """A refusal is a line of the table; one bad configuration must not end a report."""
     row, frame = row_of("windows", configuration("shadow-planes", None, {"media": "paper"}))
     assert (row.status, frame, row.error, row.times) == ("refused", None, None, None)
     assert "lights with a place" in row.reason

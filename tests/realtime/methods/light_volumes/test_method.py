@@ -259,7 +259,7 @@ def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
     assert error("upright") < 0.15 * error("slanted")
 
 
-# What is refused, and what is taken of memory ------------------------------------------------------------------------
+# Refusals and memory -------------------------------------------------------------------------------------------------
 
 
 def test_a_mesh_is_for_media_without_bounds(variant):

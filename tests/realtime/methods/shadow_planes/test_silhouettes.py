@@ -46,7 +46,7 @@ def layers_over(occluders, light, way):
 
 
 def layers_gained(occluders, contour, light, start, end):
-    """What the silhouette says is gained on the way from one direction to another, along the shorter arc."""
+    """Layers gained, by the silhouette, on the way from one direction to another along the shorter arc."""
     a, b = occluders.vertices[contour.edges[:, 0]] - light, occluders.vertices[contour.edges[:, 1]] - light
     across = np.sign(determinant(a, b, start)) - np.sign(determinant(a, b, end))
     within = determinant(start, end, a) * determinant(start, end, b) < 0

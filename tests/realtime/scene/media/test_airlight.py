@@ -150,7 +150,7 @@ def test_an_ambient_field_fills_bounded_media(variant):
     ],
 )
 def test_random_scenes_against_the_reference(variant, scene, bound):
-    """What sweeps found; the error before, at 160 x 120, and at rays that meet edges what is left.
+    """Scenes that sweeps found; in brackets the error before the fix, at 160 x 120.
 
     Segments graze spheres in the fog around them (2: 9e-5); light from infinity bends at the 72 facets of two bodies
     (84: 1.7e-3); segments pass edges of boxes on their way to fog and other boxes (146: 1.2e-3).

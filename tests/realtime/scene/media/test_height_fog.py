@@ -108,7 +108,7 @@ def test_panels_on_certified_rays(variant, clamped):
     assert relative_errors(generic, "double").max() < 1e-9
     if not clamped:
         assert relative_errors(by_tag(*HARD), "double").max() < 1e-8
-        # Beside a light the rounding of the row's own coordinates is a part of the distance.
+        # Next to a light the rounding of the row's coordinates is a part of the distance.
         assert relative_errors(by_tag("small-H"), "single").max() < 2e-5
 
 

@@ -32,7 +32,7 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
         bounded = [medium for medium in drawn["media"] if medium["bounds"] != "unbounded"]
         assert len(reference.media) == len(bounded)
         assert ours.features.clear == (len(bounded) == len(drawn["media"]))
-        # What was drawn arrives, to the precision of the scene, single.
+        # The drawn values arrive in single precision, as the scene has it.
         sigma = {medium.name: medium.sigma_t for medium in reference.media} | {"unbounded": reference.medium.sigma_t}
         for medium in drawn["media"]:
             np.testing.assert_allclose(sigma[medium["name"]], medium["sigma_t"], rtol=1e-6)
@@ -43,7 +43,7 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
 def test_the_same_seed_is_the_same_scene(variant):
     digests = [scene_digest(load_scene(name, (8, 6)).scene) for name in ("random:3", "random:3", "random:4")]
     assert digests[0] == digests[1] != digests[2]
-    # Of records, whose numbers no variant rounds: an old seed keeps its scene.
+    # An old seed keeps its scene: the digest is of records, whose numbers no variant rounds.
     words = hashlib.sha256()
     for seed in range(8):
         drawn = drawn_values(f"random:{seed}")
@@ -157,7 +157,7 @@ def test_no_number_is_round(scenes):
 
 
 def found(*meshes):
-    """What light reaches of a stage about the origin of radius 1 under a lamp, with occluders."""
+    """The lit part of a stage about the origin of radius 1 under a lamp, with occluders."""
     camera = {"origin": np.array([0.0, -4.0, 0.1]), "target": np.zeros(3), "fov": 47.0}
     lamp = Light("light-1", "point", np.array([0.0, 0.3, 5.0]), np.zeros(3), np.ones(3), 1.0)
     drawn = draw_scene(0, ranges_from({}))
