@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The description of a scene as a table, and what becomes of each scene file of a folder."""
+"""The description of a scene as a table, and the outcome of each scene file of a folder."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -94,7 +94,7 @@ def _words(value: Any, name: str = "") -> str:
 
 @dataclass(frozen=True)
 class FileOutcome:
-    """What became of a file."""
+    """The outcome of a file."""
 
     file: str  #: within the folder
     outcome: str  #: 'taken', 'refused', or 'failed' where the program did not see why

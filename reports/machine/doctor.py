@@ -37,7 +37,7 @@ _PATIENCE = 180.0  # seconds for the first kernel; the first one on a GPU compil
 
 @dataclass(frozen=True)
 class Kernel:
-    """What the test kernel found."""
+    """The findings of the test kernel."""
 
     variant: str
     threads: int
@@ -89,7 +89,7 @@ class Cache:
 
 @dataclass(frozen=True, repr=False)
 class Doctor(Result):
-    """What works on this machine, and what is cached."""
+    """The checks of this machine, and the contents of the cache."""
 
     machine: Machine
     cache: Cache
@@ -105,7 +105,7 @@ class Doctor(Result):
 
     @property
     def tables(self) -> Sequence[Table]:
-        """What works, with details."""
+        """The checks with details."""
         return [table("", words("what", "works", "details"), map(vars, self.machine.checks))]
 
     @property

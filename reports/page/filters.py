@@ -161,7 +161,7 @@ def drawn(function: Callable[..., Table | Iterable[Table]]) -> Callable[..., Any
     return draw
 
 
-#: What the templates call, by name.
+#: Functions that the templates call, by name.
 TABLES: dict[str, Callable[..., Any]] = {
     "fastest_table": drawn(fastest_table),
     "methods_table": drawn(methods),

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures of radiance and of errors, as 8-bit arrays and PNG files.
 
-What is compared is linear up to white (`tone_mapped`): twice the radiance looks twice as bright, what is brighter than
-white is cut off. What is only looked at, previews and the gallery, goes through the curve of `preview`, which keeps the
-colours of lights and shows the dark of a room.
+Pictures for comparison are linear up to white (`tone_mapped`): twice the radiance is shown twice as bright, and values
+above white are cut off. Previews and the gallery go through the curve of `preview`, which keeps the colours of lights
+and shows the dark of a room.
 
 Equal steps of an error map look like equal steps of colour. The map of signed errors is made here: dark blue, over
 white in the middle, to dark red. Each arm is a quadratic Bezier curve in CAM16-UCS (Li et al. 2017), a space in which
 the distance of two colours is about how different they look, walked in equal steps of length. The arms are as long as
 one another within a few per cent, so that an error looks as large on either side. Values without a sign use viridis,
-HDR-FLIP uses magma, as its authors do; both are even by construction (van der Walt and Smith 2015). Of the ready-made
-maps that end as dark, colorcet's CET-D1A (Kovesi 2015) is the nearest: its steps differ by up to 34 % of their mean in
-CAM16-UCS, those here by 5 %, and its middle is not white.
+HDR-FLIP uses magma, as its authors do; both are even by construction (van der Walt and Smith 2015). The nearest
+ready-made map with equally dark ends is colorcet's CET-D1A (Kovesi 2015): its steps differ by up to 34 % of their mean
+in CAM16-UCS, the steps here by 5 %, and its middle is not white.
 """
 
 import functools

@@ -52,14 +52,14 @@ class Study(Said):
         Parameters
         ----------
         path
-            Of the file; its ending says what is written.
+            Path of the file; its ending says what is written.
         column
-            Of a figure: 'single' (3.5 inches) or 'double' (7.16 inches).
+            Width of a figure: 'single' (3.5 inches) or 'double' (7.16 inches).
 
         Raises
         ------
         InputError
-            For another ending, and a figure that the study has not.
+            For another ending, and a study without a figure.
         """
         from reference.storage.files import write_text
         from reports.tables.drawing import csv, latex, markdown

@@ -34,15 +34,15 @@ def noise(
     """Measure bias and noise of methods that draw random numbers, by independent runs of one frame.
 
     The reference has no noise. Methods that draw no random numbers stand in the same table: all of their error is bias.
-    See docs/your-engine.md for what the numbers are; `airlight compare SCENE "runs/####.exr"` has the same for renders
-    of others.
+    docs/your-engine.md explains the numbers; `airlight compare SCENE "runs/####.exr"` has the same for renders of
+    others.
 
     Parameters
     ----------
     scene
         A built-in scene, random:SEED or a Mitsuba XML file.
     runs
-        Of each method that draws random numbers.
+        Number of runs of each method that draws random numbers.
     method, kernel, settings
         As in `airlight study methods`.
     size
@@ -233,9 +233,9 @@ _STYLES = {
 def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> Study:
     """Measure estimators of the transmittance of rays through a density grid.
 
-    Naive exponentials of a marched sum are too bright, by Jensen's inequality: the row says by how much, and how much
-    follows from the variance of the sum. Beside them stand ratio tracking, unbiased ray marching and the jackknife, all
-    against the exact optical depth, over 48 rays between random places of the grid.
+    Naive exponentials of a marched sum are too bright, by Jensen's inequality: the row gives the bias, and the bias
+    expected from the variance of the sum. Ratio tracking, unbiased ray marching and the jackknife are compared, too,
+    all against the exact optical depth, over 48 rays between random places of the grid.
 
     Parameters
     ----------

@@ -7,10 +7,11 @@ failed, hung or died is a try that missed. Where the target and the error differ
 nothing is decided. Such a scene is within at the upper end of the interval and not at the lower one: the interval holds
 the fraction whatever an exact reference would have said.
 
-Properties are correlated with errors by ranks, as neither has a scale of its own. A property that goes with an error
-need not cause it. Properties go with one another too (more lights, more triangles): of several that say nearly the same
-the one that goes with the error most is named. All intervals of correlations hold together with the level (Bonferroni):
-each has the level 1 - (1 - level)/m of m correlations. With hundreds of these, some would be away from zero by chance.
+Properties are correlated with errors by ranks, as neither has a natural scale. A property that correlates with an error
+need not cause it. Properties correlate with one another too (more lights, more triangles): among several that say
+nearly the same, the one with the strongest correlation is named. All intervals of correlations hold together with the
+level (Bonferroni): each has the level 1 - (1 - level)/m of m correlations. With hundreds of these, some would be away
+from zero by chance.
 """
 
 from collections.abc import Sequence
@@ -125,7 +126,7 @@ LEAST = 10  #: scenes below which no correlation is stated
 
 @dataclass(frozen=True)
 class Correlation:
-    """Of a property with the error of a configuration, over scenes."""
+    """Correlation of a property with the error of a configuration, over scenes."""
 
     label: str  #: of the configuration
     property: str

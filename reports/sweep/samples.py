@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Parquet of a sweep by columns, and what the scenes say of each configuration: one sample a scene.
+"""The Parquet of a sweep by columns, and the errors of each configuration over scenes: one sample a scene.
 
 Neither Mitsuba nor a scene is needed.
 
-Cells of one scene are not independent of one another, so they do not count twice: of the media of a scene the one with
-the largest error stands for it. A configuration is a method with its kernel, its parameters and the size of its image.
-Scenes that were drawn at random are a sample of what their ranges hold, and claims are about these alone; scenes that
-somebody chose are a sample of nothing, and stand in for it only where there are no others.
+Cells of one scene are not independent of one another, so they do not count twice: the medium with the largest error
+stands for its scene. A configuration is a method with its kernel, its parameters and the size of its image. Scenes that
+were drawn at random are a sample of what their ranges hold, and claims are about these alone; scenes that somebody
+chose are a sample of nothing, and stand in for it only where there are no others.
 """
 
 import re

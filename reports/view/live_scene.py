@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene that changes from frame to frame, and no more than that is made again; its stages timed one by one.
+"""A scene that changes from frame to frame, of which only changed parts are made again; its stages timed one by one.
 
 Camera, lights and media are opaque arrays, so their changes record nothing. A configuration has its own recorded
-functions: they are kept for the last few, and configurations share those that cast and shade, which know nothing of a
-method but whether it finds out which surfaces are lit. What the camera rays meet is kept while the camera stands still.
+functions: they are kept for the last few configurations, which share the functions that cast and shade. These depend on
+a method only in whether it finds out which surfaces are lit. Hits of camera rays are kept while the camera stands
+still.
 """
 
 import time
@@ -102,7 +103,7 @@ class LiveScene:
 
     @property
     def there(self) -> dict[str, Any]:
-        """What can be changed in the scene, with its values now."""
+        """The changeable parameters of the scene, with their present values."""
         return changeable(self.source)
 
     @property

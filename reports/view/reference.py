@@ -40,7 +40,7 @@ def pixel_order(width: int, height: int) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class KnownReference:
-    """What is known of the reference of an image; what is not is NaN."""
+    """The known part of the reference of an image; the rest is NaN."""
 
     airlight: Array  #: (height, width, 3) [W/(m^2 sr)]
     surface: Array  #: [W/(m^2 sr)]
@@ -48,7 +48,7 @@ class KnownReference:
 
     @staticmethod
     def of_size(width: int, height: int) -> "KnownReference":
-        """Return what is known before there is anything."""
+        """Return a reference of which nothing is known."""
         return KnownReference(*(np.full((height, width, 3), np.nan) for _ in range(3)))
 
     @property
@@ -133,7 +133,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was found for a task: rays, the end, or why there is no reference."""
+    """The answer to a task: rays, the end, or why there is no reference."""
 
     task: int
     pixels: Any = None  #: numbers of pixels, (rays,)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page can change, as data for its widgets, and the commands that show or render it again.
+"""Data for the widgets of the page, and the commands that show or render its frame again.
 
-All of it follows from typed records, nothing is listed here. What the page is sent is JSON, made of dictionaries here.
+All of it follows from typed records, nothing is listed here. The page gets JSON, made from dictionaries here.
 """
 
 import shlex
