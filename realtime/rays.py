@@ -157,8 +157,8 @@ class RayGeometry:
     def lit_segment(self, x0, x1) -> tuple[Any, Any]:
         """Return the part of [x0, x1] that the light could reach, x1 = x0 where there is none [m].
 
-        That is all of it, but for a spot, which lights what is inside its cone, and a light sample, which lights what
-        lies before its plane. `x1` may be infinite.
+        All of the ray is lit, except for a spot, which lights the part inside its cone, and a light sample, which
+        lights what lies before its plane. `x1` may be infinite.
         """
         return (x0, x1) if self.enter is None else _clip(self.enter, self.leave, x0, x1)
 
@@ -185,7 +185,7 @@ class RayGeometry:
         return [(x0, inner0), (inner0, inner1), (dr.select(stays, x0, inner1), dr.select(stays, x0, x1))]
 
     def falloff_beside(self, light: Light, s):
-        """Return `falloff` at `s` = x - foot [m]: of a light sample, close to which x has not the digits."""
+        """Return `falloff` at `s` = x - foot [m]: for a light sample, x lacks the digits close to it."""
         if light.facing is None:
             return self.falloff(light, self.foot + s)
         square = dr.fma(s, s, dr.square(self.height))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes the pictures of README and documentation: `python docs/tools/gallery.py [NAME ..]`.
 
-A name is a picture's, a scene's or a method's; without one all are made, but for the page of a report, which takes a
+A name is a picture's, a scene's or a method's; without one all are made, except for the page of a report, which takes a
 browser and a report in `airlight-report`. `docs/gallery/gallery.json` lists the file, the command and what it shows.
 How each method works is drawn in `method-NAME-sketch.png`, which no program makes.
 """

@@ -8,10 +8,10 @@ lengths alone. So
     sigma_s = sigma_t mean(rho where rho > rho_0)        stands for the extinction of slabs: that of the cloud's body,
     Z = int rho dx / mean(rho where rho > rho_0)         for their thickness along the light, from the surface on,
 
-of which the product is the optical thickness of the cloud as it is there, gaps and wisps counted as what they hold. The
-light map keeps front and front - Z, so that the filter and the search are those of homogeneous clouds. Depths below the
-surface, and the ways to collectors, are lengths times sigma_s: exact where rho is as in the body, which it is but for a
-layer at the surface.
+whose product is the true optical thickness of the cloud, gaps and wisps counted with their densities. The light map
+keeps front and front - Z, so that the filter and the search are the same as for homogeneous clouds. Depths below the
+surface, and the ways to collectors, are lengths times sigma_s: exact where rho equals that of the body, which is
+everywhere except in a layer at the surface.
 
 Along a ray the density is taken at the ends of steps of a voxel, and the place between two of them at which it passes
 rho_0 is linear.

@@ -17,8 +17,8 @@ at all four corners, in both directions and all channels, and errs by about the 
 edge of surfaces, has a Delta of its own size. The corners at the ends of a row have one neighbour and take the Delta of
 the corner beside them: there the error of a kink is up to one Delta instead of a half.
 
-A smooth curvature of the opposite sign, whose own Delta is c, hides a kink that is not larger. With both within the
-tolerance, s h w <= tolerance f + c, at the ends of a row
+A smooth curvature of the opposite sign, with the second difference c, hides a kink that is not larger. With both within
+the tolerance, s h w <= tolerance f + c, at the ends of a row
 
     s h w (1 - w) - c/8 <= tolerance f + 7 c/8,
 

@@ -52,12 +52,12 @@ def next_frame(
     """Render a scene, and reuse what the last frame left.
 
     `renderer`: the stages of the frame, with the number of the first one. `scene`: the scene as it is now: that of the
-    renderer but for camera, positions, lights, colours and medium. `cache`: what the last frame left; None for the
-    first, for which everything is made. If nothing is said to move in it, it is shaded by the function that the next
-    ones will use: then these record nothing. `camera_moved`, `geometry_moved`, `light_moved`: what is elsewhere than in
-    the last frame, or turned: the camera, shapes or the bounds of media, a light. The medium and the colours of lights
-    may have changed in any case. Returns `stages`: as from `realtime.frame.renderer.run_stages`: bit by bit what it
-    returns for this scene; `cache`: for the next frame.
+    renderer except for camera, positions, lights, colours and medium. `cache`: that of the last frame; None for the
+    first, for which everything is made. If nothing is said to move in the first frame, it is shaded by the function
+    that later frames use, which then record nothing. `camera_moved`, `geometry_moved`, `light_moved`: whether the
+    camera, shapes or the bounds of media, or a light moved or turned since the last frame. The medium and the colours
+    of lights may have changed in any case. Returns `stages`: bit by bit the result of
+    `realtime.frame.renderer.run_stages` for this scene; `cache`: for the next frame.
     """
     moved = {"camera_moved": camera_moved, "geometry_moved": geometry_moved, "light_moved": light_moved}
     return _next_of(replace(renderer, scene=scene), cache, None, **moved)

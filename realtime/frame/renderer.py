@@ -147,10 +147,10 @@ def frame_renderer(
 
     `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an airlight kernel
     function; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have the further layers that the
-    method names; in a scene with area lights they have not. In others all lights are in one group then; `parameters`:
-    values of the method's parameters, and of `realtime.area_lights.points.LightSamples`; the others have their
-    defaults. Raises InputError for a parameter that the method does not have, where a kernel is missing, and for what
-    the method refuses of the scene; what it or the kernel refuses of the rays comes with the first frame.
+    method names, which puts all lights into one group; never in a scene with area lights; `parameters`: values of the
+    method's parameters, and of `realtime.area_lights.points.LightSamples`; the others have their defaults. Raises
+    InputError for a parameter that the method does not have, a missing kernel, and a scene that the method refuses;
+    refusals that depend on the rays come with the first frame.
     """
     chosen, light_samples = method_parameters(method, parameters)
     if chosen.uses_kernel and kernel is None:

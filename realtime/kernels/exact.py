@@ -65,7 +65,7 @@ the end, by sigma_t (1 + s1/r1) a metre.
 
 A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes, or eight, leave no more
 than 1e-6, wherever the segment lies (`realtime.scene.rule_reach` again). Nodes are places s0 + f L, s0 = x0 - foot:
-close to the light, x itself has not the digits.
+close to the light, x itself lacks the digits.
 """
 
 from collections.abc import Callable

@@ -35,7 +35,7 @@ class Unshadowed(Method):
     """Airlight as if nothing cast a shadow.
 
     Valid for any scene without occluders between a light and a visible part of the medium; elsewhere it shows how much
-    light the volumetric shadows take away. Bounded media have their own nodes, except for a polynomial kernel.
+    light the volumetric shadows take away. Bounded media have their own nodes, except with a polynomial kernel.
 
     References
     ----------

@@ -124,7 +124,7 @@ def read_again(known: Scene, scene) -> Scene:
 
 
 def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
-    """Return the fields of a `Scene` but for its shapes, and the opaque shapes."""
+    """Return the fields of a `Scene` except for its shapes, and the opaque shapes."""
     camera, sensor = sensor_camera(scene, types)
     opaque, boundaries = sort_shapes(scene)
     medium, meshes = read_medium(sensor, boundaries, types)

@@ -166,10 +166,10 @@ def _points(plan: PointPlan, number: int, kind: str) -> Array:
 
 
 def _controlled(found: Array, fractions: Array) -> Array:
-    """Correct sums of replicates, (rays, 3, replicates), by the known whole of what a part of their samples has.
+    """Correct sums of replicates, (rays, 3, replicates), by the known solid angle as a control variate.
 
-    A replicate whose sections have the fraction s of the light's solid angle, of mean 1, is given (1 - s) c more. c is
-    what the whole is worth by the other replicates, which know nothing of s: the mean stays what it is.
+    A replicate whose sections have the fraction s of the light's solid angle, of mean 1, gets (1 - s) c more. c is the
+    sum for the whole solid angle by the other replicates, which are independent of s: the mean does not change.
     """
     others = fractions.sum(axis=1, keepdims=True) - fractions
     worth = (found.sum(axis=2, keepdims=True) - found) / np.maximum(others, np.finfo(float).tiny)[:, None]

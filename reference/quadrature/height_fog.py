@@ -78,7 +78,7 @@ def _of_places(medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Te
     how: dict[str, Any] = {"weight": weight, "rtol": terms.rtol or RTOL}
     ends = x0, np.maximum(x0, x1)
     value, error = height_fog_segments(fog, heights, *ends, medium.phase, shadow_scale=terms.shadow_scale, **how)
-    for x in (x0, x1):  # a relative uncertainty of the distance from the light is worth r times the integrand
+    for x in (x0, x1):  # a relative uncertainty of the distance from the light adds r times the integrand
         s = np.where(np.isfinite(x), x, rays.foot[ray]) - rays.foot[ray]
         r = np.maximum(np.hypot(rays.height[ray], s), np.finfo(np.float64).tiny)
         z = heights.origin + heights.rise * (heights.foot + s)

@@ -5,14 +5,14 @@ For each light and each ray, in float64:
 
 1. the visible surface ends the ray (cast in float32, as by every method, so that all share the same surface; where that
    is a polygon or a sphere its distance is computed again in float64);
-2. the ray up to there, or what is in the cone of a spot, is cut into lit intervals by exact geometry
+2. the ray up to there, or its part in the cone of a spot, is cut into lit intervals by exact geometry
    (`reference.visibility.shadows`), which random shadow rays then check (`reference.visibility.certificate`);
 3. the intervals are integrated and added up, with an error estimate (`reference.quadrature.fields`);
 4. a light reaches the surface where its last interval does (`reference.quadrature.surface`).
 
-The bound of a ray adds the estimates, what the rounding of each edge between light and shadow is worth, and what the
-shadow rays left in doubt. Area lights come last (`reference.quadrature.area_lights`), and the sky
-(`reference.quadrature.sky`), with standard errors of their own.
+The bound of a ray adds the estimates, the effect of the rounding of each edge between light and shadow, and the parts
+that shadow rays left in doubt. Area lights come last (`reference.quadrature.area_lights`), and the sky
+(`reference.quadrature.sky`), with their own standard errors.
 """
 
 from collections.abc import Callable

@@ -74,7 +74,7 @@ def lit_stretches(light: ReferenceLight, rays: Rays, lit: LitIntervals) -> Stret
     if not light.is_soft or light.cosine:
         return ray, low, high
     inner0, inner1 = cone_interval(rays[ray], light, light.beam)
-    # Where the ray misses the beam the profile is smooth but for the middle of the cone, where it peaks: cut there.
+    # Where the ray misses the beam the profile is smooth except for the middle of the cone, where it peaks: cut there.
     middle = 0.5 * (inner0 + inner1)
     misses = inner1 < inner0
     ends = np.where(misses, middle, inner0), np.where(misses, middle, inner1)

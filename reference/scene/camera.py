@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Camera rays in float64: directions through positions on the film of a perspective camera.
 
-Mitsuba's own `sample_ray` gives them in float32, and from the near clip plane on; near a light that rounding is worth
-1e-5 of the airlight. Here they are derived in units of a pixel on the plane where pixels are squares of size 1; a test
-holds them against `sample_ray`.
+Mitsuba's own `sample_ray` gives them in float32, and from the near clip plane on; near a light this rounding changes
+the airlight by 1e-5. Here directions are derived in units of a pixel on the plane where pixels are squares of size 1; a
+test compares them with `sample_ray`.
 """
 
 import mitsuba as mi

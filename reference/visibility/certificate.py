@@ -131,7 +131,7 @@ def _measure(rays: Rays, x: Array, ray: Index | slice) -> Array:
 
 
 def coordinates(rays: Rays, shapes: Shapes) -> Array:
-    """Return what the relative uncertainty of coordinates is worth on each ray, by edges of shadows, (rays,) [m].
+    """Return the effect of the relative uncertainty of coordinates on each ray, by edges of shadows, (rays,) [m].
 
     That is, under a directional light: the largest distance between the camera and what is on shadow segments, over the
     sine.

@@ -96,7 +96,7 @@ class LayeredImage(Pictured):
         Raises
         ------
         InputError
-            For a layer that the image has not.
+            For a layer that the image lacks.
         """
         return image_layer(self.image, name)
 

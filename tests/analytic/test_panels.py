@@ -49,7 +49,7 @@ def test_every_certified_value(data_folder, name, tolerance):
     value, error = integrate_cases(cases)
     relative = np.abs(value - cases.value) / cases.value
     assert relative.max() < tolerance, worst_by_tag(cases, relative)
-    # the error estimate meets the tolerance asked for and covers the error (but for the rounding of the geometry)
+    # the error estimate meets the tolerance asked for and covers the error (except for the rounding of the geometry)
     assert (error <= 1.01e-10 * value).all()
     assert (np.abs(value - cases.value) <= error + (0 if "rays" not in name else tolerance * value)).all()
 

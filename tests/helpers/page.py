@@ -132,7 +132,7 @@ def write_files(folder: Path) -> Path:
 
 
 def write_report_files(folder: Path) -> Path:
-    """Write a whole report but for its page; pictures are of a few pixels."""
+    """Write a whole report except for its page; pictures are of a few pixels."""
     write_files(folder)
     for name in named_files(small_report()):
         if not (folder / name).exists():

@@ -59,7 +59,7 @@ def _likelihood(errors: Array, scale: float) -> float:
 
 
 def is_enough(explanation: Explanation, right: Explanation, scale: float, pairs: tuple[Index, Index]) -> bool:
-    """Return whether a fault is worth a name: nobody doubts it, and it changes the image by `LEAST_EFFECT`.
+    """Return whether a fault is named: its evidence is beyond doubt, and it changes the image by `LEAST_EFFECT`.
 
     A fault without a number may change less, since nothing was fitted, if it leaves a fifth of the difference, or noise
     alone where the unchanged scene leaves more: shadows that are missing in the fog change a few pixels by a tenth.

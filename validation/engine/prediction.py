@@ -113,7 +113,7 @@ class SceneLight:
             whole, single = (volpath_batch(reference, seed, _PATHS, max_depth=depth).mean for depth in (64, 2))
             parts.append((whole - single)[[LAYERS.index(layer) for layer in ("airlight", "surface")]])
         image = np.mean(parts, axis=0).reshape(2, reference.height, reference.width, 3)
-        # It is smooth but for edges, and noisy.
+        # It is smooth except for edges, and noisy.
         width = reference.width / _SMOOTH
         return np.asarray(gaussian_filter(image, (0, width, width, 0)).reshape(2, -1, 3))
 

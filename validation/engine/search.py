@@ -154,7 +154,7 @@ class _Search:
         return tuple(math.exp(value) if parameter.logarithmic else float(value) for parameter, value in pairs)
 
     def on_line(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
-        """Return the best value of one parameter; `near`: it is known but for a few steps of differences."""
+        """Return the best value of one parameter; `near`: it is known except for a few steps of differences."""
         (parameter,) = self.parameters
         low, high = (float(self.inward((end,))[0]) for end in (parameter.low, parameter.high))
 

@@ -204,7 +204,7 @@ class _Table:
         return f"{self.name}, {place}, column '{name}'"
 
     def numbers(self, name: str, *, infinite: bool = False) -> Array:
-        """Return the column `name` as numbers, (rows,), finite but for `x1` and where `infinite` allows it.
+        """Return the column `name` as numbers, (rows,), finite except for `x1` and where `infinite` allows it.
 
         Raises InputError for a cell that is no number, or not finite, with its place.
         """

@@ -102,7 +102,7 @@ def published_errors(
 
 
 def _errors(r: Array, t: Array) -> dict[str, Any]:
-    """Return the metrics of the table but for ours."""
+    """Return the metrics of the table except for ours."""
     size = np.abs(t - r)
     square = size**2
     mse = _mean(square)

@@ -22,7 +22,7 @@ _RAY = 2e-6  # of any other method, by light [s]
 _REFERENCE = 100e-6  # of the quadrature, by ray [s]
 _SAMPLE = 1e-6  # of single-scatter and volpath [s]
 _PATH = 20e-6  # of a path through a cloud [s]
-_GPU = 100.0  # threads that a GPU is worth
+_GPU = 100.0  # threads that a GPU replaces
 TIMED = 8  #: frames that timing takes where they are slow
 _FRAME_BYTES, _REFERENCE_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
 

@@ -28,7 +28,7 @@ from realtime.scene.camera import Camera
 from realtime.scene.media.medium import Medium, Rays
 
 _RATIO = 8  # far/near
-_OPTICAL_REACH = 3.0  # optical depth behind a light that is worth slices: e^-6 = 0.25 % of the light comes back from it
+_OPTICAL_REACH = 3.0  # optical depth behind a light that deserves slices: e^-6 = 0.25 % of the light comes back from it
 _REACH = 32.0  # the same in distances of the light: the airlight beyond x falls like 1/x
 
 

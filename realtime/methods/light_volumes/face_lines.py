@@ -60,7 +60,8 @@ def in_face(heights: InverseDepthField, face, away, direction, segment):
     begin, end = segment
     if not heights.projection.w:
         begin, end = _cut(begin, end, s0, ds)
-    # The neighbours across come later in the order of axes, but for the last axis; those above only for the first one.
+    # The neighbours across come later in the order of axes, except for the last axis; those above only for the first
+    # one.
     for start, slope, is_first in (
         (c0 + a0, dc + da, face < 4),
         (c0 - a0, dc - da, face < 4),

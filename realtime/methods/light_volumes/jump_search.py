@@ -79,7 +79,7 @@ def _jumping_sides(heights: InverseDepthField):
     of_leaf, side = dr.gather(mi.UInt32, leaf, lane // _SIDES), lane % _SIDES
     edge = _edge_of(heights, of_leaf, side)
     begin_height, end_height = _ends(heights, edge)
-    # The far border of a leaf belongs to the next one, but for the last.
+    # The far border of a leaf belongs to the next one, except for the last.
     outer = dr.select(edge.upright, edge.i, edge.j)
     own = (side % (_SIDES // 2) < LEAF * LEAF) | (outer == heights.size)
     some = dr.compress(own & (dr.abs(begin_height - end_height) > _JUMP * dr.maximum(begin_height, end_height)))

@@ -45,7 +45,7 @@ class LightVolumes(Method):
     Valid for all lights and any shapes that rays can be cast against; the map of a directional light covers the media,
     and its shadows on surfaces always come from rays. Exact with respect to the shadow map: what it misses of the scene
     falls as the size of a texel. A map without hits lights everything; a light inside a closed occluder lights nothing
-    outside it. Bounded media are for evaluation=walk; they have nodes of their own, but for a polynomial kernel.
+    outside it. Bounded media are for evaluation=walk; they have their own nodes, except with a polynomial kernel.
 
     References
     ----------

@@ -51,7 +51,7 @@ class ShadowPlanes(Method):
     """The airlight between shadow planes.
 
     Valid for all lights and occluders that are triangle meshes, closed or not. Shadows are those of the triangles,
-    exact to rounding, with order=exact. Bounded media have nodes of their own, but for a polynomial kernel. With
+    exact to rounding, with order=exact. Bounded media have their own nodes, except with a polynomial kernel. With
     buffer=8bit the in-scattered radiance is what the buffer holds less the lit surfaces.
 
     References

@@ -151,7 +151,7 @@ def test_what_a_method_of_ones_own_prepares_is_made_anew_unless_it_says_otherwis
 
 @pytest.mark.claim("frames-are-replayed")
 def test_frames_replay_whatever_moves(variant):
-    """No stage is recorded again, but for the camera rays, once, where part of Mitsuba's scene is another."""
+    """No stage is recorded again, except for the camera rays, once, where part of Mitsuba's scene is another."""
     renderer = made(built_in("two-pens"), "shadow-planes")
     _, kept = next_frame(renderer, renderer.scene, None, **STILL)
     for now, moved in frames(renderer.scene, STEPS):

@@ -196,7 +196,7 @@ def test_ray_through_a_box_in_closed_form(variant, way):
     g = float(np.float32(0.6))
     p = (1 - g * g) / (1 + g * g - 2 * g * cos_scatter) ** 1.5
     expected = reference.directional[0].irradiance / (4 * np.pi) * medium.albedo * sigma_t * p * integral
-    assert values.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, but for rounding
+    assert values.airlight[0] == pytest.approx(expected, rel=1e-12)  # the closed form, except for rounding
     assert np.all(values.bound < 1e-6 * values.airlight)
 
 

@@ -27,7 +27,7 @@ def without_times(data):
 
 
 @pytest.mark.slow
-@pytest.mark.claim("reports-from-clusters", tolerance="none: the same numbers, but for times")
+@pytest.mark.claim("reports-from-clusters", tolerance="none: the same numbers, except for times")
 def test_a_report_from_a_cluster_says_the_same(tmp_path, monkeypatch, variant):
     # No patience, which a busy machine would try; margins that some dozen batches decide.
     checks = Checks((16, 12), {"single-scatter": 0.02, "volpath": 0.2}, {"single-scatter": 32, "volpath": 8}, 64)

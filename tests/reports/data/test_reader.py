@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def folder(tmp_path):
-    """A whole small report but for its page."""
+    """A whole small report except for its page."""
     return write_report_files(tmp_path / "old")
 
 

@@ -160,7 +160,7 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
     repeated = again(written, tmp_path, fresh=True, configurations=(MARCH,), checks=checks)
     assert (repeated["cached"], repeated["computed"]) == (0, 3 + 1)
     assert set(calls) == {quadrature_image, single_scatter_batch}
-    # The same numbers, but for the times.
+    # The same numbers, except for the times.
     before, (after,) = written.data["scenes"][0]["methods"][-1], repeated["scenes"][0]["methods"]
     assert before["error"] == after["error"]
     assert before["times"] != after["times"]

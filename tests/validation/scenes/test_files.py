@@ -56,7 +56,7 @@ def image(scene):
 
 
 def test_a_cylinder_is_one_mesh_for_all(load):
-    """Its name, place and material stay, and its shadow is that of the round one but for the sides."""
+    """Its name, place and material stay, and its shadow is that of the round one except for the sides."""
     scene = load(LAMP, shape("cylinder", GREY, name="pipe", size=0.3))
     (pipe,) = scene.shapes()
     assert (pipe.id(), pipe.is_mesh(), pipe.face_count()) == ("pipe", True, 512)

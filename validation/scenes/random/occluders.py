@@ -281,7 +281,7 @@ def _plane(stream: Draws, kind: str, normal: Array, balls: Sequence[tuple[Array,
 
 
 def _room(stream: Draws, balls: Sequence[tuple[Array, float]]) -> Occluder:
-    """Return a closed room, seen from inside, around all balls; its floor is level but for a few degrees."""
+    """Return a closed room, seen from inside, around all balls; its floor is level except for a few degrees."""
     low = np.min([position - radius for position, radius in balls], axis=0) - stream.between(0.11, 0.31)
     high = np.max([position + radius for position, radius in balls], axis=0) + stream.between(0.11, 0.31)
     half = 0.5 * (high - low) * 1.13

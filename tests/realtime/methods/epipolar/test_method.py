@@ -69,7 +69,7 @@ def test_slices_leave_at_equal_steps_and_reach_every_pixel(variant, place):
     assert np.array(point[0]) == pytest.approx(i, abs=1e-4)
     assert np.array_equal(np.array(pixel_number(slices, *point)), pixel)
     number = neighbour(slices, mi.Int32(slice_coordinate(slices, *point) + 0.5))
-    # No pixel is farther from the slice that stands for it than half a step between slices, but for the few in whose
+    # No pixel is farther from the slice that stands for it than half a step between slices, except for the few in whose
     # square the epipole lies.
     across = vectors(slices.across)[np.array(number)]
     normal = np.cross(vectors(slices.towards), across)

@@ -240,7 +240,7 @@ def rough(**changes):
 def test_an_even_grid_is_a_homogeneous_cloud(variant):
     """Half the largest density everywhere but in a corner without cloud: flights end where nothing is."""
     values = np.full((40, 40, 40), 0.5)
-    values[0, 0, 0] = 1.0  # beyond the box but for a fraction of 1e-5 of a voxel
+    values[0, 0, 0] = 1.0  # beyond the box except for a fraction of 1e-5 of a voxel
     even = paths(clouds_of(rough(values=values)), 24, 256)
     homogeneous = paths(clouds_of(DROPLETS | {"sigma_t": 0.5 * 0.0517, "albedo": 0.96}), 24, 256, first=100)
     check_equal(even, homogeneous, 0.02, ("airlight", "airlight_1"))
