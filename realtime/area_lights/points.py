@@ -123,7 +123,7 @@ _NEAR = 4e-6  #: of the largest coordinate: how far off the shape rays start, so
 class LightSamples(Parameters):
     """How a method renders area lights; without effect where there are none."""
 
-    points: int = parameter(16, "points of equal power that stand for each area light", least=1, most=4096)
+    points: int = parameter(16, "light samples of equal power for each area light", least=1, most=4096)
     pattern: str = parameter(
         "sobol",
         "where they lie: on a ring, as in Ali 2016; in the middles of a grid; Sobol's sequence; or the grid in the "

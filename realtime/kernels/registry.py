@@ -81,7 +81,7 @@ KERNELS: dict[str, Kernel] = {
     "uniform": Kernel(
         "uniform",
         uniform,
-        "midpoint steps in the distance: what most shaders do",
+        "midpoint steps in the distance, as in most shaders",
         "Billeter, Sintorn, Assarsson 2010, section 2",
         MappingProxyType({"steps": 100}),
     ),

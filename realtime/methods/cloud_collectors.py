@@ -102,11 +102,11 @@ class CloudCollectors(Method):
         "grid", "the canonical transport by its grid, or by the paper's functions", choices=("grid", "fit")
     )
     thickness: str = parameter(
-        "slab", "slabs as thick as they are across, or along the light, as printed", choices=("slab", "light")
+        "slab", "thickness of slabs across their faces, or along the light as printed", choices=("slab", "light")
     )
     peak: str = parameter(
         "matched",
-        "the density loses what the phase function loses below 5 degrees, or half, as printed, or both lose nothing",
+        "cut the peak below 5 degrees and lower the density to match, or by half as printed; or keep the peak",
         choices=("matched", "half", "full"),
     )
     single: str = parameter(

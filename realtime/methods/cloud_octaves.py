@@ -61,7 +61,7 @@ class CloudOctaves(Method):
     """
 
     name = "cloud-octaves"
-    summary = "clouds: single scattering that is extinguished less with every octave, what engines do"
+    summary = "clouds: single scattering with less extinction in every octave, as in game engines"
     source = "Wrenninge 2013; Hillaire 2016"
     renders_clouds = True
     layers = (*ORDER_LAYERS, OPACITY)
@@ -69,13 +69,13 @@ class CloudOctaves(Method):
     casts_rays = True
     provides_visibility = True
 
-    octaves: int = parameter(8, "how many", least=1, most=31)
-    extinction: float = parameter(0.5, "a: times the depth of the segment, with every octave", above=0, most=1)
-    contribution: float = parameter(0.5, "b: times the amount, with every octave", above=0, most=1)
-    anisotropy: float = parameter(0.5, "c: times the mean cosine, with every octave", least=0, most=1)
+    octaves: int = parameter(8, "number of octaves; each multiplies the last by a, b and c", least=1, most=31)
+    extinction: float = parameter(0.5, "a: factor on the optical depth to the light", above=0, most=1)
+    contribution: float = parameter(0.5, "b: factor on the radiance", above=0, most=1)
+    anisotropy: float = parameter(0.5, "c: factor on the mean cosine", least=0, most=1)
     phase: str = parameter(
         "scene",
-        "scene: each cloud's own; isotropic, hg:G or hg-draine:DIAMETER for all",
+        "scene: that of each cloud; isotropic, hg:G or hg-draine:DIAMETER for all",
         check=_check_phase,
         wanted="scene, isotropic, hg:G or hg-draine:DIAMETER",
     )

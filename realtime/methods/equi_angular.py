@@ -54,7 +54,7 @@ class EquiAngular(Method):
 
     samples: int = parameter(1, "samples of every ray", least=1)
     jitter: str = parameter(
-        "white", "what draws them: white noise, a mask of blue noise, or interleaved gradient noise", choices=PATTERNS
+        "white", "noise of the samples: white, a mask of blue noise, or interleaved gradient noise", choices=PATTERNS
     )
     animate: str = animate()
 

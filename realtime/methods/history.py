@@ -17,7 +17,7 @@ class History(Parameters):
     alpha: float = parameter(0.1, "weight of the newest frame", above=0, most=1)
     reproject: str = parameter(
         "none",
-        "what the last frame showed in the same pixel, or where it saw the surface of the pixel",
+        "the last frame in the same pixel, or where it showed the surface of the pixel",
         choices=("none", "surface"),
     )
     clamp: str = parameter(

@@ -71,8 +71,7 @@ class RayMarch(Method):
     )
     depth: str = parameter(
         "exact",
-        "optical depth up to a step, with `sum=steps`: that of the medium, or a running sum over the steps, as engines "
-        "have it",
+        "optical depth up to a step, with `sum=steps`: exact, or a running sum over the steps, as engines have it",
         choices=("exact", "running"),
     )
     jitter: str = jitter()

@@ -101,7 +101,7 @@ class MinMax(Method):
         most=_MOST,
         wanted=f"up to {_MOST}, or 0 for as many as the image needs",
     )
-    step: int = parameter(16, "one sample in so many is computed, besides those at breaks of the depth", choices=STEPS)
+    step: int = parameter(16, "every N-th sample is computed, besides those at breaks of the depth", choices=STEPS)
     sampling: str = parameter(
         "slices",
         "interpolate, or compute every pixel in its nearest slice: then `samples` and `step` have no effect",

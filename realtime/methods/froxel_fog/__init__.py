@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Froxel fog: scattered light in a grid that is aligned with the view, summed front to back; what engines ship.
+"""Froxel fog: scattered light in a grid that is aligned with the view, summed front to back, as in game engines.
 
 Read in this order:
 

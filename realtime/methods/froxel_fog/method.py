@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Froxel fog as a method: what engines ship for volumetric light, by the parameters that they have.
+"""Froxel fog as a method: volumetric light as in game engines, with their parameters.
 
 A frame injects the scattered light into a grid along the view, sums it front to back, and looks the sum up at the depth
 of every pixel. Three kernels: over froxels, columns and pixels. The cost of the first two does not depend on the image.
@@ -43,7 +43,7 @@ class FroxelFog(Method):
     """The airlight by froxels."""
 
     name = "froxel-fog"
-    summary = "scattered light in a grid along the view, summed front to back: what engines ship"
+    summary = "scattered light in a grid along the view, summed front to back, as in game engines"
     source = "Wronski 2014; Hillaire 2015"
     prepared_from = frozenset({"geometry", "light"})
     at_once = True
@@ -52,7 +52,7 @@ class FroxelFog(Method):
     height: int = parameter(90, "froxels down the image", least=1, most=4096)
     slices: int = parameter(64, "froxels in depth", least=1, most=4096)
     far: float = parameter(
-        0.0, "depth where the grid ends; 0: that of the farthest surface, or where light fades", least=0, unit="m"
+        0.0, "depth where the grid ends; 0: at the farthest surface, or where light fades", least=0, unit="m"
     )
     jitter: str = parameter(
         "none", "samples in the middle of froxels, or moved from frame to frame", choices=("none", "frames")

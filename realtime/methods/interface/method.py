@@ -286,7 +286,7 @@ def jitter() -> Any:
     """Return the field of the parameter by which the samples of rays are shifted."""
     return parameter(
         "none",
-        "what shifts the samples of a ray: nothing, white noise, a mask of blue noise, or interleaved gradient noise",
+        "shift of the samples of a ray: none, white noise, a mask of blue noise, or interleaved gradient noise",
         choices=("none", *PATTERNS),
     )
 
@@ -295,7 +295,7 @@ def animate() -> Any:
     """Return the field of the parameter by which the pattern of `jitter` changes from frame to frame."""
     return parameter(
         "none",
-        "frames with patterns of their own, or that of frame 0 plus the frame's number times the golden ratio",
+        "a new pattern in every frame, or that of frame 0 plus the frame's number times the golden ratio",
         choices=("none", "golden"),
     )
 
@@ -304,7 +304,7 @@ def tolerance() -> Any:
     """Return the field of the parameter that every method has whose rays can be interpolated."""
     return parameter(
         0.0,
-        "what may be interpolated between the corners of tiles, as a fraction of the airlight; 0: nothing, all are "
+        "error allowed to interpolation between the corners of tiles, as a fraction of the airlight; 0: all pixels are "
         "computed",
         least=0,
         below=1,

@@ -71,7 +71,7 @@ class LightVolumes(Method):
     )
     threshold: float = parameter(
         THRESHOLD,
-        "for `adaptive`: departure from the map that is allowed, relative to the depth",
+        "for `adaptive`: allowed departure from the map, relative to the depth",
         above=0,
         wanted=f"a positive number, for instance {THRESHOLD:g}",
     )

@@ -88,7 +88,7 @@ class ShadowPlanes(Method):
         choices=("float", "8bit"),
     )
     white: float = parameter(
-        1.0, "the radiance that fills the 8-bit buffer; what is brighter is cut off", above=0, unit="W/(m^2 sr)"
+        1.0, "the radiance that fills the 8-bit buffer; brighter values are cut off", above=0, unit="W/(m^2 sr)"
     )
     rows: int = parameter(
         16,

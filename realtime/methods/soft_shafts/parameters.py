@@ -73,11 +73,11 @@ class SoftShaftsParameters(Method):
     )
     narrow: float = parameter(
         0.0,
-        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel asks four light samples",
+        "with `interleave` and `hd=auto`: in penumbrae narrower than this every pixel tests four light samples",
         least=0,
         unit="pixels",
     )
-    filter: str = parameter("bilateral", "of visibility and airlight", choices=("bilateral", "gauss", "none"))
+    filter: str = parameter("bilateral", "filters of visibility and airlight", choices=("bilateral", "gauss", "none"))
     hd: str = parameter(
         "5",
         "standard deviation of the filter in the image; auto: by pixel, from the width of the penumbra",
@@ -92,7 +92,7 @@ class SoftShaftsParameters(Method):
         wanted="a number above 0, or inf",
     )
     guide: str = parameter(
-        "self", "what the bilateral filter compares: the image itself, or depths", choices=("self", "depth")
+        "self", "values that the bilateral filter compares: the image itself, or depths", choices=("self", "depth")
     )
     hz: float = parameter(0.05, "relative difference of depths at which pixels are no longer alike", above=0, most=10)
 
