@@ -152,7 +152,7 @@ def environment(**changes: Any) -> dict[str, Any]:
 
 def stable(kernel: str, *broken: str) -> dict[str, Any]:
     """Return the stability of a kernel, which breaks some of its bars."""
-    return {"kernel": kernel, "exact": True, "refused": {}, "sets": [], "gamma": {}, "broken": [*broken]}
+    return {"kernel": kernel, "exact": True, "refused": {}, "sets": [], "broken": [*broken]}
 
 
 def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:

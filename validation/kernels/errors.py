@@ -44,9 +44,6 @@ from validation.kernels.records import KernelErrors
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
-#: Distance from 1 to the next number: the unit of Boost's reports.
-EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
-
 _NODES = 8
 _LARGEST_DEPTH = 87.0
 _FARTHEST = 2.0**63  # [m]
@@ -83,14 +80,11 @@ def _peak(name: str, g: float) -> float:
     return float(np.max(phase(np.array([-1.0, 1.0]))))
 
 
-def errors_by_group(
-    cases: Cases, values: Values, precision: str, rows: Mapping[str, Rows], *, expected: Array | None = None
-) -> dict[str, KernelErrors]:
-    """Return the relative errors [1] of each group of rows, against what is `expected` or the value of the cases."""
-    expected = cases.value if expected is None else expected
-    assert expected is not None
-    error = relative_error(values.J, expected, precision, underflow_allowance(cases, precision))
-    return {name: _errors(cases, values, error, np.isfinite(expected), group) for name, group in rows.items()}
+def errors_by_group(cases: Cases, values: Values, precision: str, rows: Mapping[str, Rows]) -> dict[str, KernelErrors]:
+    """Return the relative errors [1] of each group of rows, against the value of the cases."""
+    assert cases.value is not None
+    error = relative_error(values.J, cases.value, precision, underflow_allowance(cases, precision))
+    return {name: _errors(cases, values, error, np.isfinite(cases.value), group) for name, group in rows.items()}
 
 
 def _errors(cases: Cases, values: Values, error: Array, known: Rows, group: Rows) -> KernelErrors:

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rays that kernels are tried on: quasi-random, exact float32 numbers, with the reference from `analytic`.
 
-Three sets, each the same on every machine:
+Two sets, each the same on every machine:
 
 * `hard_rays` covers every magnitude: optical depth 1e-6 to 60 (of the shortest way camera, segment, light), height over
   distance 1e-7 to 1, scale 1e-6 to 1e6, |g| up to 0.95, light before and behind the camera, segments from 1e-3 to 1e3
   distances and unbounded ones, all phase functions.
-* `slivers` are short segments far from the camera and from the light: what a light volume adds up as differences of
-  J(0, x).
 * `wide_rays` is the set W on which costs are compared: optical depth 1e-4 to 60 at the distance of the light (what is
   dimmer than exp(-60) float32 flushes to zero on the way), angle to the light 1e-3 to 179.999 degrees, uniform, length
   1e-3 to 100 distances, from the camera on. With extinction 1 the optical depth is the distance itself: J obeys
@@ -64,21 +62,6 @@ def hard_rays(count: int = 100_000) -> Cases:
         "generic",
     )
     return with_reference(table(phase, g, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
-
-
-def slivers(count: int = 8192) -> Cases:
-    """Return short segments far from camera and light, isotropic and Rayleigh in turn, with the true J."""
-    u = _sobol(count, 6)
-    distance = 10 ** (2 * u[:, 0] - 1)
-    angle = np.pi * (0.02 + 0.96 * u[:, 1])
-    foot, height = _rounded(distance * np.cos(angle)), _rounded(distance * np.sin(angle))
-    x0 = _rounded(distance * _log(u[:, 2], 3.0, 100.0))
-    x1 = np.maximum(_rounded(x0 * (1 + _log(u[:, 3], 1e-5, 1e-2))), np.nextafter(np.float32(x0), np.float32(np.inf)))
-    sigma_t = _rounded(_log(u[:, 4], 1e-3, 5.0) / (x0 + np.hypot(x0 - foot, height)))
-    phase = np.where(u[:, 5] < 0.5, "isotropic", "rayleigh")
-    tags = np.full(count, "sliver")
-    zero = np.zeros(count)
-    return with_reference(table(phase, zero, foot=foot, height=height, x0=x0, x1=x1, sigma_t=sigma_t, tags=tags))
 
 
 def wide_rays(count: int, phase: str = "isotropic", g: float = 0.0, *, reference: bool = True) -> Cases:

@@ -34,17 +34,6 @@ class Rays:
     columns: str  #: of the lines `worst`
     single: Mapping[str, KernelErrors]
     double: Mapping[str, KernelErrors]
-    single_against_double: Mapping[str, KernelErrors]  #: of the same source
-
-
-@dataclass(frozen=True, kw_only=True)
-class GammaDifference:
-    """J(x0, x1) beside J(0, x1) - J(0, x0)."""
-
-    direct: KernelErrors
-    difference: KernelErrors
-    median_rounding: float | None  #: error of the difference in units of eps (J(0, x0) + J(0, x1))
-    max_rounding: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +44,6 @@ class Stability:
     exact: bool  #: whether it claims to be
     refused: Mapping[str, str]  #: its words, by phase function
     sets: tuple[Rays, ...]
-    gamma: Mapping[str, GammaDifference]  #: by precision
     broken: tuple[str, ...]  #: bars that a kernel which claims to be exact does not keep
 
 
@@ -91,14 +79,3 @@ class KernelCost:
     def time(self) -> RayTime | None:
         """The time by which kernels are compared: the device's where it is known."""
         return self.device or self.wall
-
-
-@dataclass(frozen=True, kw_only=True)
-class ErrorLevel:
-    """The cheapest kernel at an error."""
-
-    phase: str
-    statistic: str  #: 'max' or 'p99'
-    level: float
-    cheapest: str | None
-    ns: float | None  #: of a ray

@@ -2,14 +2,9 @@
 """Where kernels break: every kernel on certified values and on rays of every magnitude.
 
 The certified values are the files of `validation.certified`.
-
-A light volume and shadow planes add and subtract Gamma(x) = J(0, x). For a sliver far from the light two nearly equal
-numbers are subtracted, and with relative rounding errors of size eps the difference J(0, x1) - J(0, x0) is wrong by
-about eps (J(0, x0) + J(0, x1)), however exact the kernel: `gamma_difference` compares both.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,9 +12,9 @@ from realtime.kernels.registry import KERNELS
 from validation.certified.files import certified_data
 from validation.kernels.case_files import Cases, read_cases
 from validation.kernels.cases import Kernel, Values, evaluate_cases
-from validation.kernels.errors import EPSILON, Rows, errors_by_group, groups
-from validation.kernels.rays import hard_rays, slivers
-from validation.kernels.records import GammaDifference, Rays, Stability
+from validation.kernels.errors import Rows, errors_by_group, groups
+from validation.kernels.rays import hard_rays
+from validation.kernels.records import Rays, Stability
 from validation.study.configuration import find_kernel
 
 Progress = Callable[[int, int, str], None]
@@ -47,17 +42,16 @@ def stability(
     """Study kernels, all of the registry by default, on the certified rays and on so many generated ones."""
     chosen = [(name, find_kernel(name)) for name in names or KERNELS]  # refuse a wrong name before any work
     sets = {name: read_cases(certified_data(name)) for name in CERTIFIED} | {GENERATED: hard_rays(count)}
-    thin = slivers()
     results = []
     for number, (name, function) in enumerate(chosen):
         if progress is not None:
             progress(number, len(chosen), name)
-        results.append(kernel_stability(name, function, sets, thin))
+        results.append(kernel_stability(name, function, sets))
     return results
 
 
-def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: Cases) -> Stability:
-    """Study one kernel on sets of rays with known J, the generated ones among them, and on slivers."""
+def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases]) -> Stability:
+    """Study one kernel on sets of rays with known J, the generated ones among them."""
     exact = claims_exact(name)
     broken: list[str] = []
     studied = []
@@ -67,38 +61,15 @@ def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases], thin: 
         refused |= values["single"].refused
         rows = groups(cases)
         errors = {each: errors_by_group(cases, values[each], each, rows) for each in PRECISIONS}
-        both = errors_by_group(cases, values["single"], "single", rows, expected=values["double"].J)
-        studied.append(Rays(name=label, columns=",".join(cases.header), **errors, single_against_double=both))
+        studied.append(Rays(name=label, columns=",".join(cases.header), **errors))
         if exact:
             broken += _broken(label, cases, values)
-    gamma = {precision: gamma_difference(function, thin, precision) for precision in PRECISIONS}
-    return Stability(kernel=name, exact=exact, refused=refused, sets=tuple(studied), gamma=gamma, broken=tuple(broken))
+    return Stability(kernel=name, exact=exact, refused=refused, sets=tuple(studied), broken=tuple(broken))
 
 
 def claims_exact(name: str) -> bool:
     """Return whether a kernel claims to be exact: by its name or by a field `exact` in the registry."""
     return name == "exact" or bool(getattr(KERNELS.get(name), "exact", False))
-
-
-def gamma_difference(function: Kernel, cases: Cases, precision: str) -> GammaDifference:
-    """Compare J(x0, x1) with J(0, x1) - J(0, x0)."""
-    direct = evaluate_cases(cases, function, precision)
-    start = np.zeros(len(cases.x0))
-    far = evaluate_cases(replace(cases, x0=start), function, precision)
-    near = evaluate_cases(replace(cases, x0=start, x1=cases.x0), function, precision)
-    # The values of a frame buffer of this precision.
-    dtype = np.float32 if precision == "single" else np.float64
-    with np.errstate(over="ignore", invalid="ignore"):
-        J = (far.J.astype(dtype) - near.J.astype(dtype)).astype(np.float64)
-        rounding = np.abs(J - cases.value) / (EPSILON[precision] * (np.abs(far.J) + np.abs(near.J)))
-    everything = {"all": np.ones(len(J), dtype=bool)}
-    finite = rounding[np.isfinite(rounding)]
-    return GammaDifference(
-        direct=errors_by_group(cases, direct, precision, everything)["all"],
-        difference=errors_by_group(cases, replace(direct, J=J), precision, everything)["all"],
-        median_rounding=float(np.median(finite)) if len(finite) else None,
-        max_rounding=float(finite.max()) if len(finite) else None,
-    )
 
 
 def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:

@@ -17,7 +17,7 @@ from tests.helpers.reports import checked, entry, growth_record, record_of, refu
 
 _ERRORS = {"rays": 77, "refused": 5, "median": 1.5e-7, "p99": 2.5e-6, "max": 4.5e-6}
 _ERRORS |= {"nan": 0, "infinite": 0, "negative": 2, "mean": 2e-7, "worst": None}
-_GROUPS = {name: {"all": _ERRORS} for name in ("single", "double", "single_against_double")}
+_GROUPS = {name: {"all": _ERRORS} for name in ("single", "double")}
 STABILITY = [
     {
         "kernel": "my-kernel",

@@ -18,9 +18,9 @@ from validation.kernels.benchmark import measure, speed_against_error
 from validation.kernels.case_files import read_cases
 from validation.kernels.cases import TABLE, Values, evaluate_cases, integrate_cases, summary, write_results
 from validation.kernels.errors import errors_by_group, groups
-from validation.kernels.rays import hard_rays, slivers, table, wide_rays
+from validation.kernels.rays import hard_rays, table, wide_rays, with_reference
 from validation.kernels.records import KernelCost, RayTime
-from validation.kernels.stability import GENERATED, _broken, gamma_difference, kernel_stability
+from validation.kernels.stability import GENERATED, _broken, kernel_stability
 
 
 def gauss(geometry, x0, x1, medium, light):
@@ -32,7 +32,7 @@ def isotropic(cases):
 
 
 def study(function, name="own:kernel"):
-    return kernel_stability(name, function, {GENERATED: isotropic(hard_rays(256))}, slivers(64))
+    return kernel_stability(name, function, {GENERATED: isotropic(hard_rays(256))})
 
 
 def four_rays():
@@ -82,8 +82,6 @@ def test_small_relative_mistake_is_found_where_it_is(variant):
     assert tags["behind"].median == pytest.approx(1e-3, rel=1e-3)
     assert tags["thin"].max < 1e-4
     assert verdict.sets[0].single["all"].worst.split(",")[0] in ("behind", "infinite")
-    # Both precisions have the same mistake: they agree.
-    assert verdict.sets[0].single_against_double["behind"].median < 1e-6
     assert (verdict.exact, verdict.broken) == (False, ())
 
 
@@ -109,11 +107,28 @@ def test_negative_and_missing_values_break_the_claim(variant):
 
 @pytest.mark.claim("differences-of-gamma")
 def test_differences_of_gamma_lose_what_theory_says(variant):
-    """Rounding of the two terms, each to about half an epsilon, over their difference."""
-    loss = gamma_difference(gauss, slivers(256), "single")
-    assert loss.direct.max < 1e-4
-    assert loss.difference.median > 1e-3
-    assert 0.05 < loss.median_rounding < 5
+    """Light volumes add up Gamma(x) = J(0, x). Of a sliver far from camera and light two nearly equal Gammas remain.
+
+    Each is rounded to about half an epsilon, so that their difference is off by about epsilon times their sum.
+    """
+    random, count = np.random.default_rng(1), 256
+    distance, angle = 10 ** random.uniform(-1, 1, count), np.pi * random.uniform(0.02, 0.98, count)
+    x0 = np.float32(distance * 10 ** random.uniform(0.5, 2, count)).astype(np.float64)
+    x1 = np.float32(x0 * (1 + 10 ** random.uniform(-5, -2, count))).astype(np.float64)
+    foot, height = distance * np.cos(angle), distance * np.sin(angle)
+    sigma_t = 10 ** random.uniform(-3, 0.7, count) / (x0 + np.hypot(x0 - foot, height))
+    columns = {"foot": foot, "height": height, "sigma_t": sigma_t}
+    thin = with_reference(
+        table(["isotropic"] * count, np.zeros(count), x0=x0, x1=x1, tags=["sliver"] * count, **columns)
+    )
+    start = np.zeros(count)
+    ends = (replace(thin, x0=start), replace(thin, x0=start, x1=x0))
+    far, near = (evaluate_cases(cases, gauss, "single").J.astype(np.float32) for cases in ends)
+    off = np.abs((far - near).astype(np.float64) - thin.value)
+    direct = np.abs(evaluate_cases(thin, gauss, "single").J - thin.value)
+    assert (direct / thin.value).max() < 1e-4
+    assert np.median(off / thin.value) > 1e-3
+    assert 0.05 < np.median(off / (2.0**-23 * (far.astype(np.float64) + near))) < 5
 
 
 # Rays of which single terms are below 2^-126 though their sums are far above, with the J of each. A processor that
@@ -221,24 +236,24 @@ COSTS = (
 
 
 def level(levels, statistic, value):
-    return next(each for each in levels if (each.statistic, each.level) == (statistic, value))
+    return next(each for each in levels if (each["statistic"], each["level"]) == (statistic, value))
 
 
 def test_cheapest_kernel_of_each_level():
     levels = speed_against_error(COSTS)
     assert len(levels) == 12
     coarse, fine, finest = (level(levels, "max", value) for value in (1e-1, 1e-2, 1e-6))
-    assert (coarse.cheapest, coarse.ns) == ("table-64", 4.0)
-    assert fine.cheapest == "quadrature-8"
-    assert (finest.cheapest, finest.ns) == (None, None)
+    assert (coarse["cheapest"], coarse["ns"]) == ("table-64", 4.0)
+    assert fine["cheapest"] == "quadrature-8"
+    assert (finest["cheapest"], finest["ns"]) == (None, None)
     # 99 % of the rays are ten times better here.
-    assert level(levels, "p99", 1e-2).cheapest == "table-64"
-    assert level(levels, "p99", 1e-6).cheapest == "quadrature-16"
+    assert level(levels, "p99", 1e-2)["cheapest"] == "table-64"
+    assert level(levels, "p99", 1e-6)["cheapest"] == "quadrature-16"
 
 
 def test_values_that_are_not_finite_reach_no_level():
     fast = cost("taylor", 4, 1.0, 1e-7, nonfinite=1)
-    assert level(speed_against_error([*COSTS, fast]), "max", 1e-1).cheapest == "table-64"
+    assert level(speed_against_error([*COSTS, fast]), "max", 1e-1)["cheapest"] == "table-64"
 
 
 def test_measured_errors_and_times_are_those_of_the_kernel(variant):
@@ -280,7 +295,7 @@ def test_hard_rays_cover_every_magnitude(rays):
     assert (rays.x1 > rays.x0).all()
 
 
-@pytest.mark.parametrize("draw", [lambda: hard_rays(1000), lambda: slivers(512), lambda: wide_rays(512, "hg", 0.8)])
+@pytest.mark.parametrize("draw", [lambda: hard_rays(1000), lambda: wide_rays(512, "hg", 0.8)])
 def test_inputs_are_exact_float32_and_values_fit_float32(draw):
     cases = draw()
     for name in COLUMNS:
