@@ -31,7 +31,6 @@ class Column:
     unit: str  #: '1' for a number without a unit, empty for what is no number
     meaning: str
     kind: str  #: 'string', 'int64', 'float64', 'bool' or 'binary', as Arrow names them
-    needed: bool = False  #: whether every record has a value
 
 
 def column(heading: str = "", unit: str | None = None, meaning: str = "", *, default: Any = MISSING) -> Any:
@@ -102,7 +101,7 @@ def record_of(data: Any, kind: type[_Record]) -> _Record:
 def _columns(record: Any, prefix: str) -> Iterator[Column]:
     hints = get_type_hints(record)
     for each in fields(record):
-        kind, optional = _kind(hints[each.name])
+        kind = _kind(hints[each.name])
         heading, unit, meaning = each.metadata.get(_COLUMN, ("", None, ""))
         heading = heading or each.name.replace("_", " ")
         if is_dataclass(kind):
@@ -111,13 +110,12 @@ def _columns(record: Any, prefix: str) -> Iterator[Column]:
                 yield replace(inner, heading=f"{heading}, {inner.heading}", meaning=words)
         elif kind in _KINDS:
             usual = "1" if kind in (int, float) else ""
-            needed = not (optional or prefix)
-            yield Column(prefix + each.name, heading, usual if unit is None else unit, meaning, _KINDS[kind], needed)
+            yield Column(prefix + each.name, heading, usual if unit is None else unit, meaning, _KINDS[kind])
 
 
-def _kind(hint: Any) -> tuple[Any, bool]:
-    """Return the type of a field without None, and whether None is allowed."""
+def _kind(hint: Any) -> Any:
+    """Return the type of a field without None."""
     if get_origin(hint) in (Union, types.UnionType):
         inside = [each for each in get_args(hint) if each is not type(None)]
-        return (inside[0] if len(inside) == 1 else None), len(inside) < len(get_args(hint))
-    return hint, False
+        return inside[0] if len(inside) == 1 else None
+    return hint

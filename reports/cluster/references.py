@@ -91,7 +91,7 @@ def tracing(
         return (value for _, value in _done(cluster, groups))
 
     workers = len(cluster.scheduler_info(n_workers=-1)["workers"])
-    return Elsewhere(bring, batches or _WAVE * max(1, workers))
+    return bring, batches or _WAVE * max(1, workers)
 
 
 def spread(cluster: Client, picture: Picture) -> ElsewhereFor:

@@ -25,7 +25,7 @@ class Outer:
 
 def test_columns_and_values_have_the_same_keys():
     assert columns_of(Outer) == (
-        Column("name", "name", "", "", "string", needed=True),
+        Column("name", "name", "", "", "string"),
         Column("count", "count", "1", "how many", "int64"),
         Column("inner.low", "time, least", "ms", "of a frame: of all", "float64"),
     )

@@ -28,7 +28,7 @@ BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `airlight compare` prints."""
+    """The numbers that `airlight compare` prints."""
 
     layer: str  #: the layer that was compared
     metrics: Metrics  #: of all pixels that the mask leaves

@@ -64,7 +64,6 @@ class Ranked:
     """A fault in the order of evidence."""
 
     name: str
-    parameter: float | None  #: its only number
     parameters: tuple[float, ...]
     words: str
     residual: float  #: mean relative error that it leaves, with what stands beside it
@@ -262,7 +261,7 @@ class _Attempt:
                 shown = chosen if each.names == chosen.names else each
                 rows += _rows(shown, evidence(shown, self.right, scale))
         if not chosen.faults:
-            rows.insert(0, Ranked(RIGHT, None, (), "nothing is wrong", self.right.error, 0.0, ()))
+            rows.insert(0, Ranked(RIGHT, (), "nothing is wrong", self.right.error, 0.0, ()))
         elif len(chosen.faults) == 1:
             rows.sort(key=lambda row: row.name != chosen.names[0])
         return chosen, rows
@@ -287,9 +286,9 @@ class _Attempt:
         if len(explanation.faults) > 1:
             return leaves_nothing(explanation, self.pixel)
         if explanation.faults and not self.predictor.reference.area:
-            # An error that is small for an image may be large next to the effect of the fault, if it is the wrong
-            # fault: # a factor leaves 0.4 % where a lamp has 0.25 m, all of it in the shadows, and another g leaves 0.2
-            # % where # the near plane is at 0.1 m, most of it in the middle.
+            # An error that is little for an image may be much beside what the fault itself does, if it is a wrong one:
+            # a factor leaves 0.4 % of what a lamp of 0.25 m does, all of it in the shadows, and another g 0.2 % of a
+            # near plane at 0.1 m, most of it in the middle.
             return leaves_nothing(explanation, "centre") or is_noise(explanation, pairs)
         return usual_error(explanation) <= self.little or is_noise(explanation, pairs)
 
@@ -380,15 +379,7 @@ def _in_order(first: Fault, second: Fault) -> tuple[Fault, Fault]:
 def _rows(explanation: Explanation, weight: float) -> list[Ranked]:
     names = explanation.names if len(explanation.faults) > 1 else ()
     return [
-        Ranked(
-            fault.name,
-            values[0] if len(values) == 1 else None,
-            values,
-            fault.sentence(values),
-            explanation.error,
-            weight,
-            names,
-        )
+        Ranked(fault.name, values, fault.sentence(values), explanation.error, weight, names)
         for fault, values in zip(explanation.faults, explanation.values, strict=True)
     ]
 

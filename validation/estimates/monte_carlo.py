@@ -49,15 +49,9 @@ class Run:
     damaged: int  #: files of the cache that were damaged; their batches have been traced again
 
 
-@dataclass(frozen=True)
-class Elsewhere:
-    """Batches that are traced in other processes."""
-
-    #: from seeds to their batches, and what these took; what is missing is traced here
-    bring: Callable[[list[int]], Iterator[tuple[Batches, Spent]]]
-    at_once: int  #: how many seeds are asked for at once
-
-
+#: Batches that other processes trace: from seeds to their batches and what these took, where what is missing is traced
+#: here; and how many seeds are asked for at once.
+Elsewhere = tuple[Callable[[list[int]], Iterator[tuple[Batches, Spent]]], int]
 #: Estimator, samples a batch, and their counts by pixel or None -> who traces such batches.
 ElsewhereFor = Callable[[str, int, NDArray[np.integer] | None], Elsewhere]
 
@@ -126,10 +120,11 @@ def monte_carlo_batches(
         done, asked = None, first_seed
         for seeds in _blocks(first_seed, batches):
             if elsewhere is not None and seeds[-1] >= asked:
-                asked = seeds[0] + max(elsewhere.at_once, len(seeds))
+                bring, at_once = elsewhere
+                asked = seeds[0] + max(at_once, len(seeds))
                 wanted = range(seeds[0], min(first_seed + batches, asked))
                 waited = stopwatch()
-                for batch, spent in elsewhere.bring([seed for seed in wanted if not _has(folder, seed)]):
+                for batch, spent in bring([seed for seed in wanted if not _has(folder, seed)]):
                     _store(folder, batch, spent)
                     tally["brought"] += 1
                     if progress is not None:

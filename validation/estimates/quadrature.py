@@ -109,8 +109,8 @@ def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = Tr
     """Return 'airlight', 'surface' or 'total', (height, width, 3) [W/(m^2 sr)].
 
     A renderer shows the area lights that the camera sees: Mitsuba's integrators do unless `hide_emitters` is set, and
-    so do those of Blender for an emitting mesh. So `total` is airlight, lit surface and `emitted` together. It is
-    without `emitted` where a file has that as a layer beside it, as the files of `airlight reference` do, and for
+    so do those of Blender for an emitting mesh. `total` is therefore airlight, lit surface and `emitted` together. It
+    is without `emitted` where a file has that as a layer beside it, as the files of `airlight reference` do, and for
     frames of our own methods, which show no light. Where a renderer hides its lights (Blender's light objects by
     default, `hide_emitters`), compare the layer `airlight`, or leave the lights out here.
     """

@@ -78,33 +78,25 @@ def _group(columns: Array, length: Array, null: Array, members: Sequence[int]) -
 
 
 @dataclass(frozen=True)
-class Product:
-    """A product of powers of parameters that an image does not tell apart."""
-
-    name: str  #: such as 'albedo * intensity'
-    value: float
-    low: float
-    high: float | None  #: None where the image sets no end
-
-
-@dataclass(frozen=True)
 class Confounded:
     """Parameters that the image does not tell apart."""
 
     parameters: tuple[str, ...]
     held: tuple[str, ...]  #: which of them were held at the value to begin with
-    products: tuple[Product, ...]  #: what is known of them
+    #: Known of them are products of their powers, such as 'albedo * intensity', each with the ends of its
+    #: interval; the high one is None where the image sets none.
+    products: Mapping[str, tuple[float, float, float | None]]
     way_out: str
 
     @property
     def lines(self) -> list[str]:
-        """What `airlight compare --fit` prints of them."""
+        """The lines that `airlight compare --fit` prints of them."""
         names = ", ".join(self.parameters)
         alone = len(self.parameters) == 1
         lines = [f"This image says nothing of {names}." if alone else f"This image does not tell apart: {names}."]
-        for each in self.products:
-            ends = f"{each.low:.6g} or more" if each.high is None else f"{each.low:.6g} to {each.high:.6g}"
-            lines.append(f"Known is {each.name} = {each.value:.6g} ({ends}).")
+        for name, (value, low, high) in self.products.items():
+            ends = f"{low:.6g} or more" if high is None else f"{low:.6g} to {high:.6g}"
+            lines.append(f"Known is {name} = {value:.6g} ({ends}).")
         return [*lines, f"Way out: {self.way_out}."]
 
 
@@ -113,15 +105,15 @@ def confounded(
 ) -> Confounded:
     """Return what an image says of a group, from the numbers on the whole line and the ends of their intervals."""
     names = {number: unknowns[number].name for number in group.members}
-    products = []
+    products: dict[str, tuple[float, float, float | None]] = {}
     for kept, powers in group.powers.items():
         if all(unknowns[number].scale == "log" for number in (kept, *powers)):
             words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
             middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
             low, high = (float(np.exp(middle + float(length))) for length in lengths[kept])
-            products.append(Product(" * ".join(words), math.exp(middle), low, high if math.isfinite(high) else None))
+            products[" * ".join(words)] = math.exp(middle), low, high if math.isfinite(high) else None
     held = tuple(names[number] for number in group.held)
-    return Confounded(tuple(names.values()), held, tuple(products), _way_out(group, unknowns, holds))
+    return Confounded(tuple(names.values()), held, products, _way_out(group, unknowns, holds))
 
 
 def _power(name: str, power: float) -> str:

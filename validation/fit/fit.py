@@ -112,7 +112,7 @@ class Fit:
 
     @property
     def lines(self) -> list[str]:
-        """What `airlight compare --fit` prints beside the table of parameters."""
+        """The lines that `airlight compare --fit` prints beside the table of parameters."""
         pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
         holds = "airlight + surface" if self.holds == "total" else self.holds
         left = f"{self.left_out} of {self.pixels} pixels disagree with what explains the others, and are left out"

@@ -181,7 +181,6 @@ def _positions(centres: Array, rays_per_side: int) -> Array:
 class LightPaths:
     """All paths from one light of the scene."""
 
-    name: str  #: the light's id
     intensity: Array  #: radiant intensity, irradiance or radiance times area, (3,): what multiplies the nodes
     nodes: Places
     surface: Places
@@ -226,7 +225,7 @@ def scattering_paths(
                 reflected, visible = view.reflected(light, shadows=shadows)
                 points = surface_points(reference, light, view.distance, reflected, visible)
                 lit.append(_edged(points, light, source, blend))
-        paths.append(LightPaths(source.name, np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
+        paths.append(LightPaths(np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
     return tuple(paths)
 
 

@@ -51,14 +51,6 @@ _BESIDE = 1.0  # of a lamp [pixels]
 
 
 @dataclass(frozen=True)
-class MotionVerdict:
-    """The verdict on a sequence."""
-
-    kind: str  #: 'exact', 'noise', 'lag', 'late', 'ghost', 'not one lag' or 'cannot be told'
-    words: str
-
-
-@dataclass(frozen=True)
 class MotionComparison:
     """Frames of a renderer against the reference of each."""
 
@@ -70,7 +62,8 @@ class MotionComparison:
     pixel: str
     reference_error: float  #: of the worst frame, relative to its mean
     masks: Mapping[str, Measures]  #: 'all' first
-    verdict: MotionVerdict
+    kind: str  #: 'exact', 'noise', 'lag', 'late', 'ghost', 'not one lag' or 'cannot be told'
+    words: str  #: the verdict in words
     shifts: Mapping[int, float]  #: relative RMSE of frames against the reference so many frames before
     margin: float | None
     notes: tuple[str, ...]
@@ -79,11 +72,6 @@ class MotionComparison:
     def measures(self) -> Measures:
         """Those of all pixels."""
         return self.masks["all"]
-
-    @property
-    def words(self) -> str:
-        """Return the verdict."""
-        return self.verdict.words
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -136,7 +124,7 @@ class MotionComparison:
         lines += [f"shifted          {shifts} off the reference so many frames before"] if shifts else []
         lines += [f"note             {note}" for note in self.notes]
         lines += [f"failed           {reason}" for reason in self.failures]
-        return [*lines, f"verdict          {self.verdict.words}"]
+        return [*lines, f"verdict          {self.words}"]
 
     def to_json(self) -> dict[str, Any]:
         """Return every number by name, those of all pixels first."""
@@ -151,7 +139,7 @@ class MotionComparison:
                 "lag_ms": None if lag is None or fps is None else 1000 * lag / fps,
                 "shifts": {str(shift): error for shift, error in self.shifts.items()},
                 "masks": {name: each.to_json() for name, each in self.masks.items() if name != "all"},
-                "verdict": {"kind": self.verdict.kind, "words": self.verdict.words},
+                "verdict": {"kind": self.kind, "words": self.words},
                 "notes": list(self.notes),
                 "failures": list(self.failures),
             }
@@ -203,6 +191,7 @@ def compare_frames(
         notes += (f"frames {_listed(repeated)} repeat the frame before them, though the reference changed",)
     if NOTE in first.attributes:
         notes += (f"{paths[0]}: {first.attributes[NOTE]}",)
+    kind, words = motion_verdict(masks["all"], frames.reference_error)
     return MotionComparison(
         scene=scene,
         pattern=str(pattern),
@@ -212,7 +201,8 @@ def compare_frames(
         pixel=kinds[0],
         reference_error=frames.reference_error,
         masks=masks,
-        verdict=motion_verdict(masks["all"], frames.reference_error),
+        kind=kind,
+        words=words,
         shifts=shifts,
         margin=margin,
         notes=notes,
@@ -333,15 +323,15 @@ def _shifts(sequence: Sequence) -> dict[int, float]:
     return {shift: math.sqrt(sums[shift] * len(frames)) / light for shift in shifts}
 
 
-def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVerdict:
-    """Return what measures of a sequence say of it, see the module."""
+def motion_verdict(measures: Measures, reference_error: float = 0.0) -> tuple[str, str]:
+    """Return what measures of a sequence say of it, see the module: the kind, and words."""
     rmse = measures.relative_rmse.value or 0.0
     if rmse <= max(_ROUNDING, 3 * reference_error):
-        return MotionVerdict("exact", f"exact: relative RMSE {rmse:.2g}")
+        return "exact", f"exact: relative RMSE {rmse:.2g}"
     lag, persistence, delay = measures.lag.lag, measures.lag.persistence, measures.lag.delay
     noise = (measures.flicker_beside_lag.value or 0.0) / math.sqrt(2)
     if lag.value is None or lag.error is None or lag.error > _TOLD or (delay.error or 0.0) > _TOLD:
-        return MotionVerdict(
+        return (
             "cannot be told",
             f"no lag can be told: the reference changes by {_percent(measures.reference_change)} a frame, the noise is "
             f"{_percent(noise)}",
@@ -352,20 +342,20 @@ def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVe
     described = measures.lag.described if measures.lag.described is not None else 1.0
     if delay.value and not kept and described > _ONE_DELAY:
         words = "late" if delay.value > 0 else "early"
-        return MotionVerdict("late", f"the frames are {words} by {_frames(abs(delay.value))}")
+        return "late", f"the frames are {words} by {_frames(abs(delay.value))}"
     if (kept or delay.value) and described >= _ONE_LAG:
         constant = measures.lag.time_constant.value
         after = "" if constant is None else f"; what is missing of a change falls as exp(-n/{constant:.3g})"
-        return MotionVerdict("lag", f"the frames lag by {lag.value:.4g} +- {lag.error:.2g} frames{after}")
+        return "lag", f"the frames lag by {lag.value:.4g} +- {lag.error:.2g} frames{after}"
     if measures.ghost.above(_SURE):
         ages = [each.value or 0.0 for each in measures.ghost_by_age]
-        return MotionVerdict(
+        return (
             "ghost",
             f"a ghost: {_percent(measures.ghost.value or 0.0)} of the light that left a place is still there"
             + (f"; the impulse response is largest {_oldest(measures)} after it" if ages else ""),
         )
     if kept or delay.value:
-        return MotionVerdict(
+        return (
             "not one lag",
             f"not one lag: it describes {_percent(described)} of what the frames keep of earlier ones; see the impulse "
             "response",
@@ -374,7 +364,7 @@ def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVe
     factor = ""
     if gain.value is not None and abs(gain.value - 1) > max(_SURE * (gain.error or 0.0), 1e-5):
         factor = f", and a factor of {gain.value:.5g}"
-    return MotionVerdict("noise", f"no lag: noise of {_percent(noise)}{factor}")
+    return "noise", f"no lag: noise of {_percent(noise)}{factor}"
 
 
 def _oldest(measures: Measures) -> str:

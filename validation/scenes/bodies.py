@@ -6,7 +6,6 @@ around every point its triangles wind once (inside) or not at all (outside). Met
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Any
 
@@ -102,20 +101,20 @@ def _distance_to_hull(bounds: Bounds, point: Array) -> float:
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
     """Refuse meshes of which a part is inside out, or lies within another."""
-    parts = [part for number, mesh in enumerate(meshes) for part in _parts(number, mesh)]
-    boxes = [(part.corners.min(axis=(0, 1)), part.corners.max(axis=(0, 1))) for part in parts]
-    for number, part in enumerate(parts):
-        mesh = meshes[part.mesh]
-        tail, head = mesh.faces[part.first, :2]
+    parts = [(number, *part) for number, mesh in enumerate(meshes) for part in _parts(mesh)]
+    boxes = [(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for *_, corners, _ in parts]
+    for number, (own, first, _, outwards) in enumerate(parts):
+        mesh = meshes[own]
+        tail, head = mesh.faces[first, :2]
         point = mesh.vertices[tail]
         around: dict[int, int] = {}  # by mesh
         for other, (low, high) in enumerate(boxes):
             if other != number and np.all(point >= low) and np.all(point <= high):
-                winding = round(winding_number(parts[other].corners, point))
-                around[parts[other].mesh] = around.get(parts[other].mesh, 0) + winding
+                holder, _, corners, _ = parts[other]
+                around[holder] = around.get(holder, 0) + round(winding_number(corners, point))
         # A part that faces inwards is the wall of a hollow.
-        if around.pop(part.mesh, 0) != (0 if part.outwards else 1):
-            flaw = "has a part within another" if part.outwards else "is inside out"
+        if around.pop(own, 0) != (0 if outwards else 1):
+            flaw = "has a part within another" if outwards else "is inside out"
             raise InputError(
                 f"shape '{mesh.name}' bounds a medium and {flaw}, at {mesh.edge_words(tail, head)}; wanted faces that "
                 "run counter-clockwise seen from outside, and parts beside one another"
@@ -128,16 +127,8 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
             )
 
 
-@dataclass(frozen=True)
-class _Part:
-    mesh: int  #: its number
-    first: int  #: the number of one of its triangles
-    corners: Array
-    outwards: bool  #: whether its triangles face outwards
-
-
-def _parts(number: int, mesh: ClosedMesh) -> list[_Part]:
-    """Return the connected parts of a mesh."""
+def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
+    """Return of each connected part of a mesh one triangle, the corners of all, and whether these face outwards."""
     tail, head = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     graph = coo_array((np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(len(mesh.vertices),) * 2)
     _, component = connected_components(graph, directed=False)
@@ -148,7 +139,7 @@ def _parts(number: int, mesh: ClosedMesh) -> list[_Part]:
         corners = mesh.corners[inside]
         local = corners - corners.mean(axis=(0, 1))
         volume = np.einsum("ij,ij->", local[:, 0], np.cross(local[:, 1], local[:, 2]))
-        parts.append(_Part(number, int(inside[0]), corners, bool(volume > 0)))
+        parts.append((int(inside[0]), corners, bool(volume > 0)))
     return parts
 
 

@@ -8,7 +8,7 @@
              "total": {"reflectance", "transmittance", "flux": [{"depth", "up", "down"}],
                        "radiance": [{"depth", "mu", "phi", "value"}]}}
 
-Of `error` and `standard_error` each number is that of the same number of the light.
+Each number of `error` and `standard_error` is the error of the same number of the light.
 
 The computation runs twice, the second time with three quarters of the streams and two nodes fewer in each panel of
 depth. The change is the error that is printed: it is that of the coarser run, so the printed numbers are better.

@@ -86,7 +86,7 @@ def method_motion(
             images = method_frames(replace(renderer, run=run), places)
             several.append(measure(Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere)))
         found = [each for each in several if each is not None]
-        words = motion_verdict(found[0]).words if found else "the reference is dark"
+        words = motion_verdict(found[0])[1] if found else "the reference is dark"
         rows.append(MethodMotion(chosen.label, mean_measures(found) if found else None, words))
     return rows
 

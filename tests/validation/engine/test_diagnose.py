@@ -125,7 +125,7 @@ def test_two_faults_of_different_kinds_are_both_named(reference):
     both = diagnosed(0.7 * total(denser))
     assert {row.name for row in both.ranked[:2]} == {"extinction", "factor"}
     assert both.ranked[0].together == ("extinction", "factor")
-    assert [row.parameter for row in both.ranked[:2]] == pytest.approx([1.6, 0.7], rel=1e-2)
+    assert [row.parameters[0] for row in both.ranked[:2]] == pytest.approx([1.6, 0.7], rel=1e-2)
     flipped = diagnosed(total(denser)[::-1])
     assert {row.name for row in flipped.ranked[:2]} == {"extinction", "flip"}
     assert "Two faults" in "\n".join(flipped.lines)
@@ -171,7 +171,7 @@ def test_what_is_set_wrong_in_an_engine_is_named_or_placed(scenes, number):
 def test_the_fog_alone_is_too_bright(scenes):
     injected, said = named(scenes, 2)
     assert said.first == injected == "fog-factor"
-    assert said.ranked[0].parameter == pytest.approx(8.3, rel=1e-2)
+    assert said.ranked[0].parameters[0] == pytest.approx(8.3, rel=1e-2)
     assert said.rest.startswith("noise")
     assert "which is noise" in "\n".join(said.lines)
 

@@ -117,9 +117,9 @@ def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfac
     (group,) = fit.confounded
     assert group.parameters == ("albedo", "intensity", "exposure")
     assert group.held == ("intensity", "exposure")
-    (product,) = group.products
-    assert product.name == "albedo * intensity * exposure"
-    assert product.low < 0.83 < product.high
+    ((name, (_, low, high)),) = group.products.items()
+    assert name == "albedo * intensity * exposure"
+    assert low < 0.83 < high
     assert "layer" in group.way_out
     by_name = {each.name: each for each in fit.parameters}
     assert by_name["albedo"].low is None
