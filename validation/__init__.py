@@ -7,6 +7,7 @@ Read in this order:
 - `properties/`: numbers that say what a scene holds;
 - `metrics/`: errors of one image against another;
 - `statistics/`: tests for images with random errors, and the noise of errors and times;
+- `arrays.py`: names of types of arrays and of progress;
 - `columns.py`: records that know their columns: heading, unit, meaning;
 - `readers.py`: values in files of users;
 - `clock.py`, `timing.py`: times and memory of any work, and the record of a time;

@@ -4,17 +4,19 @@
 import math
 import os
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analytic.errors import InputError
 from reference.storage.exr import NOTE, TOTAL, Image, layer_names, read_exr
 from reference.storage.exr import layer as image_layer
-from validation.columns import plain
+from validation.arrays import Bools
+from validation.columns import columns_of, plain, shown_values
 from validation.metrics.colour import ColourDifference, colour_difference
 from validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
 from validation.metrics.flip import Flip, flip_hdr
@@ -79,10 +81,9 @@ class Comparison:
             lines.append("  undefined      the mean of the reference is not above zero: nothing is relative to it")
         if self.statistics is not None:
             lines += statistics_lines(self.statistics)
-        for errors in (self.errors, self.errors_normalised):
-            lines += [] if errors is None else errors_lines(errors)
-        lines += [] if self.colour is None else colour_lines(self.colour)
-        lines += [] if self.flip is None else [flip_line(self.flip)]
+        more: dict[str, Any] = {"other tools": self.errors, "over the mean": self.errors_normalised}
+        more |= {"colour": self.colour, "HDR-FLIP": self.flip}
+        lines += [line for name, record in more.items() if record is not None for line in record_lines(name, record)]
         lines += [order_line(each.layer, each.metrics, each.statistics) for each in self.orders]
         lines += [f"file             {note}" for note in self.notes]
         return "\n".join(lines + [f"failed           {reason}" for reason in self.failures])
@@ -170,7 +171,7 @@ def common_layer(reference: tuple[str, Image], test: tuple[str, Image]) -> str:
     raise InputError(f"the files share {'no layer' if not common else 'several layers, name one by --layer'}: {have}")
 
 
-def read_mask(path: str | os.PathLike[str]) -> NDArray[np.bool_]:
+def read_mask(path: str | os.PathLike[str]) -> Bools:
     """Return where the plain channels of an EXR file are not zero: truth values [1], (height, width)."""
     values = np.asarray(image_layer(read_exr(path), TOTAL, path))
     if not np.isfinite(values).all():
@@ -223,36 +224,16 @@ def order_line(layer: str, m: Metrics, s: Statistics | None) -> str:
     return f"{layer:<17}relative bias {percent(m.relative_bias)}{interval}, relative rmse {percent(m.relative_rmse)}"
 
 
-def errors_lines(e: PublishedErrors) -> list[str]:
-    """Return the errors of other tools as text."""
-    return [
-        f"unit {e.unit:<12.4g}mse {shown(e.mse)}, mae {shown(e.mae)}, psnr {shown(e.psnr)} dB, smape {shown(e.smape)}, "
-        f"mape {shown(e.mape)}",
-        f"  by tool        rse_tev {shown(e.rse_tev)}, rae_tev {shown(e.rae_tev)}, mrse_pbrt {shown(e.mrse_pbrt)}, "
-        f"relmse {shown(e.relmse)} (trimmed {shown(e.relmse_trim)}), mrse_jeri {shown(e.mrse_jeri)}",
-        f"  without floor  relative {shown(e.relative)}, largest {shown(e.relative_max)}; {e.dark} dark values wrong "
-        f"by up to {shown(e.dark_max, 3)} of the mean",
-    ]
-
-
-def colour_lines(c: ColourDifference) -> list[str]:
-    """Return the colour differences as text."""
-    return [
-        f"CIEDE2000        mean {shown(c.ciede2000_mean)}, p99 {shown(c.ciede2000_p99)}, max "
-        f"{shown(c.ciede2000_max)} at {c.exposure:+.2f} stops; {c.clipped} pixels clipped",
-        f"Delta E ITP      mean {shown(c.itp_mean)}, p99 {shown(c.itp_p99)}, max {shown(c.itp_max)}, white "
-        f"{c.white_luminance:g}, peak {c.peak_luminance:g} cd/m^2; {c.clipped_itp} pixels clipped",
-    ]
-
-
-def flip_line(f: Flip) -> str:
-    """Return FLIP as text, or why there is none."""
-    if f.value is None:
-        return f"HDR-FLIP         none: {f.note}"
-    return (
-        f"HDR-FLIP         {f.value:.4f} from {f.start_exposure:+.2f} to {f.stop_exposure:+.2f} stops, "
-        f"{f.exposures} exposures, {f.pixels_per_degree:g} pixels per degree"
-    )
+def record_lines(name: str, record: Any) -> list[str]:
+    """Return the known values of a record as text, by their headings and with their units."""
+    values = shown_values(record)
+    words = []
+    for each in columns_of(record.__class__):
+        value = values[each.key]
+        if value is not None and value != "":
+            number = value if isinstance(value, str) else shown(value)
+            words.append(f"{each.heading} {number}" + (f" {each.unit}" if each.unit not in ("", "1") else ""))
+    return textwrap.wrap("; ".join(words), 117, initial_indent=f"{name:<17}", subsequent_indent=" " * 17)
 
 
 def percent(value: float | None) -> str:

@@ -4,10 +4,9 @@
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-Array = NDArray[np.float64]
+from validation.arrays import Array
 
 
 def to_srgb(linear: Array) -> Array:

@@ -11,11 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
+from validation.arrays import Progress
 from validation.columns import plain
 from validation.engine.error_place import place_words
 from validation.engine.evidence import (
@@ -35,10 +33,8 @@ from validation.engine.faults import KINDS, faults_of
 from validation.engine.judged_layer import JudgedLayer, judged_layer
 from validation.engine.prediction import Predictor, SceneLight
 from validation.engine.search import Explanation, begin, explain
-from validation.engine.seen import Progress, decide_pixel, layers_of, pixel_kinds, scene_of_size, seen_image
+from validation.engine.seen import decide_pixel, layers_of, pixel_kinds, scene_of_size, seen_image
 from validation.scenes.loading import LoadedScene
-
-Array = NDArray[np.float64]
 
 RIGHT, UNEXPLAINED = "right", "unexplained"
 

@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, laplace, maximum_filter, minimum_filter
 
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import ReferenceScene
+from validation.arrays import Array, Bools
 from validation.columns import plain
 from validation.engine.prediction import Predictor
 from validation.engine.search import Explanation
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _MOST = 0.9  # fraction of the squared error that is most of it
 _FEW = 0.01  # fraction of the pixels that counts as few

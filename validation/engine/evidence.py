@@ -15,13 +15,10 @@ points in the fog model), or a tenth of what there was.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference.scene.read import ReferenceScene
+from validation.arrays import Array, Index
 from validation.engine.search import Explanation, usual_size
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _LEAST_EVIDENCE = 20.0  # e^20 to one: what nobody doubts
 LEAST_EFFECT = 0.002  #: mean relative change of the image: less is no fault

@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from validation.arrays import Array
 from validation.engine.prediction import Guess, Layers, Predictor
 from validation.engine.seen import stopped
 from validation.fog_model.radiance import Fog
 
-Array = NDArray[np.float64]
 Values = tuple[float, ...]
 Change = Callable[[Predictor, Guess, Values], Guess]
 

@@ -7,8 +7,9 @@ from itertools import permutations, product
 
 import numpy as np
 
+from validation.arrays import Array
 from validation.engine.curves import TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_srgb
-from validation.engine.fault import Array, Change, Fault, Parameter, Values, changed_values, scenery_number, top, undone
+from validation.engine.fault import Change, Fault, Parameter, Values, changed_values, scenery_number, top, undone
 from validation.engine.prediction import Guess, Predictor
 
 

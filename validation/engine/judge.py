@@ -36,6 +36,7 @@ from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import read_reference
 from reference.storage.exr import NOTE, TOTAL, Image, read_exr
+from validation.arrays import Array, Bools, Progress
 from validation.columns import plain
 from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
 from validation.engine.error_place import ErrorPlace, error_place
@@ -44,7 +45,6 @@ from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, j
 from validation.engine.seen import (
     PIXELS,
     PixelKind,
-    Progress,
     decide_pixel,
     pixel_kinds,
     relative_errors,
@@ -56,7 +56,6 @@ from validation.metrics.errors import FLOOR
 from validation.scenes.loading import LoadedScene
 from validation.statistics.comparison import block_sums
 
-Array = NDArray[np.float64]
 ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
 
 BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
@@ -225,7 +224,7 @@ def judge_image(
     *,
     path: str | os.PathLike[str] = "the image",
     pixel: str | None = None,
-    mask: NDArray[np.bool_] | None = None,
+    mask: Bools | None = None,
     margin: float | None = None,
     **metrics: Any,
 ) -> EngineComparison:
@@ -296,7 +295,7 @@ def relative_bound(reference: ReferenceImage) -> float:
     return float(error[finite].mean()) / mean if mean > 0 else 0.0
 
 
-def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> NDArray[np.float64]:
+def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:
     """Return how far the nearest lamp is from each pixel, (height, width) [pixels in the middle of the image]."""
     angle = pixel_angle(read_reference(loaded.scene))  # zero in an image of one column
     return reference.light_angle / angle if angle > 0 else np.full(reference.light_angle.shape, math.inf)
@@ -361,7 +360,7 @@ def _fits(reference: Array, image: Array) -> bool:
     return bool(np.isfinite(difference).all() and np.mean(difference**2) <= _EXACT**2 * power)
 
 
-def _error(reference: Array, image: Array, where: NDArray[np.bool_]) -> float:
+def _error(reference: Array, image: Array, where: Bools) -> float:
     """Return the error over some values; an infinite reference is wrong by all of it."""
     finite, chosen = np.isfinite(reference), where & np.isfinite(image)
     if not chosen.any():

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image, layer, layer_names
+from validation.arrays import Array
 from validation.estimates.quadrature import reference_layer
 
 AIRLIGHT, SURFACE = "airlight", "surface"
@@ -52,7 +53,7 @@ def judged_layer(
     return JudgedLayer(chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted)
 
 
-def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> NDArray[np.float64]:
+def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> Array:
     """Return what a layer should be, (height, width, 3) [W/(m^2 sr)]."""
     return reference_layer(reference, judged.holds, emitted=judged.emitted)
 

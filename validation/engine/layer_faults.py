@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from validation.arrays import Array
 from validation.engine.fault import (
-    Array,
     Change,
     Fault,
     Parameter,

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from validation.arrays import Array
 from validation.engine.fault import (
-    Array,
     Change,
     Fault,
     Parameter,

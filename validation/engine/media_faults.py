@@ -10,9 +10,9 @@ import numpy as np
 from analytic.height_fog import HeightFog, Layer
 from reference.scene.camera import camera_matrix
 from reference.scene.read import ReferenceScene
+from validation.arrays import Array
 from validation.engine.curves import from_srgb, to_srgb
 from validation.engine.fault import (
-    Array,
     Change,
     Fault,
     Parameter,

@@ -7,19 +7,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from reference.monte_carlo.batches import LAYERS
 from reference.monte_carlo.volpath.integrator import volpath_batch
 from reference.scene.read import ReferenceLight, ReferenceScene
+from validation.arrays import Array, Bools, Index
 from validation.engine.seen import Seen, relative_errors
 from validation.fog_model.radiance import Fog, FogModel, scene_fog
 from validation.fog_model.view import Ends, View
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours

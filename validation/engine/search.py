@@ -14,14 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from validation.arrays import Array, Bools
 from validation.engine.fault import Fault, Parameter, Values
 from validation.engine.prediction import Guess, Predictor
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
 _COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough to tell faults apart

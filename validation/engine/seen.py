@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from analytic.errors import InputError
@@ -17,16 +16,13 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.density_grid import GridMedium
 from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from reference.storage.exr import TOTAL, Image
+from validation.arrays import Array, Bools, Index
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import SAMPLES, View, scattering_paths, view_of
 from validation.metrics.errors import wrong_pixels
 from validation.scenes.loading import LoadedScene, load_scene
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-Progress = Callable[[float, str], None]
 Found = TypeVar("Found")  #: what an attempt at an image is
 
 PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre, or the mean over its area

@@ -24,7 +24,6 @@ from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference.monte_carlo.allocation import allocated
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
@@ -32,13 +31,11 @@ from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import ReferenceScene, read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from validation.arrays import Array, Bools
 from validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer
 from validation.statistics.comparison import Estimate, compare_statistics
 from validation.statistics.records import Agreement, Statistics
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MASK_PIXELS = 2.0
 #: The least margin under area lights, where the quadrature has errors of its own: 3.4e-4 of the mean airlight of
@@ -148,7 +145,7 @@ def agreements(
     return by_name
 
 
-def reference_estimate(image: ReferenceImage, layer: str, test: Estimate, mask: Mask) -> Estimate:
+def reference_estimate(image: ReferenceImage, layer: str, test: Estimate, mask: Bools) -> Estimate:
     """Return a layer of a quadrature image as the reference of a comparison of the pixels of a mask with some batches.
 
     Under area lights it has standard errors, of `REPLICATES` scramblings. All pixels share their points: the mean over
@@ -166,22 +163,22 @@ def reference_estimate(image: ReferenceImage, layer: str, test: Estimate, mask: 
     return Estimate(values, np.where(reached, error, 0.0), REPLICATES, means)
 
 
-def _bias(expected: Array, batches: Batches, layer: str, mask: Mask) -> float:
+def _bias(expected: Array, batches: Batches, layer: str, mask: Bools) -> float:
     return float(layer_mean(batches, layer, mask)[mask].sum() / expected[mask].sum() - 1)
 
 
-def layer_masks(reference: ReferenceScene, image: ReferenceImage) -> dict[str, Mask]:
+def layer_masks(reference: ReferenceScene, image: ReferenceImage) -> dict[str, Bools]:
     """Return the pixels to compare, by layer, (height, width): of the airlight those whose ray keeps off the lights."""
     near = image.light_angle <= MASK_PIXELS * pixel_angle(reference)
     return {"airlight": ~near & np.isfinite(image.airlight).all(axis=2), "surface": np.ones_like(near)}
 
 
-def layer_mean(batches: Batches, layer: str, mask: Mask) -> Array:
+def layer_mean(batches: Batches, layer: str, mask: Bools) -> Array:
     """Return the mean image of a layer, (height, width, 3) [W/(m^2 sr)]; the mask, (height, width), gives its size."""
     return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
 
 
-def batch_estimate(batches: Batches, layer: str, mask: Mask) -> Estimate:
+def batch_estimate(batches: Batches, layer: str, mask: Bools) -> Estimate:
     """Return a layer of some batches as one side of a comparison of the pixels of a mask."""
     number = LAYERS.index(layer)
     return Estimate(

@@ -17,12 +17,10 @@ target before `LEAST_BATCHES`: the standard error of a standard error is 1/sqrt(
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
@@ -35,11 +33,10 @@ from reference.scene.clouds import read_clouds
 from reference.scene.read import ReferenceScene, read_reference
 from reference.storage.exr import Image
 from reference.storage.scene_digest import scene_digest
+from validation.arrays import Array, Bools, Progress
 from validation.estimates.agreement import MASK_PIXELS, pixel_angle
 from validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
 from validation.scenes.loading import LoadedScene
-
-Progress = Callable[[float, str], None]
 
 LEAST_BATCHES = 32  #: before a standard error is good enough to stop on
 USUAL_BATCH = 64  #: samples a pixel
@@ -171,7 +168,7 @@ def cloud_orders(words: str) -> tuple[str, ...]:
 class _Watch:
     """The progress of a run: the time that it took, and how its error fell."""
 
-    def __init__(self, budget: Budget, near: NDArray[np.bool_], progress: Progress | None) -> None:
+    def __init__(self, budget: Budget, near: Bools, progress: Progress | None) -> None:
         self._budget, self._near, self._progress = budget, near, progress
         self._expected = 0  # batches until the target is reached; not known before the first error
         self._words = ""
@@ -206,7 +203,7 @@ class _Watch:
         self._progress(min(1.0, fraction), f"{estimator}, {done} batches{self._words}")
 
 
-def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, distance: NDArray[np.float64]) -> Image:
+def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, distance: Array) -> Image:
     shape = (*distance.shape, 3)
     layers = {}
     for number, name in enumerate(batches.layers):
@@ -241,7 +238,7 @@ def _power_of_two(number: int) -> int:
     return 1 << (max(1, number).bit_length() - 1)
 
 
-def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> dict[str, float]:
+def relative_errors(batches: Batches, near: Bools) -> dict[str, float]:
     """Return the relative standard errors [1] of some batches, less the airlight of pixels `near` a light, (pixels,).
 
     See the module: 'pooled' is that of the sum of all pixels' errors, the largest of all layers and channels, 'worst'
@@ -263,7 +260,7 @@ def relative_errors(batches: Batches, near: NDArray[np.bool_]) -> dict[str, floa
     return {"pooled": pooled, "worst": worst}
 
 
-def near_light(reference: ReferenceScene, distance: NDArray[np.float64]) -> NDArray[np.bool_]:
+def near_light(reference: ReferenceScene, distance: Array) -> Bools:
     """Return which pixels' rays pass a light that they see within `MASK_PIXELS` pixel widths, (pixels,).
 
     `distance` is that to the visible surface, (pixels,) [m].

@@ -11,13 +11,11 @@ rounding alone shows as a relative standard error of the order of 6e-8, where th
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LAYERS, combined_moments, parse_seed_ranges, seed_ranges
 from reference.storage.exr import TOTAL, Attribute, Image
-
-Array = NDArray[np.float64]
+from validation.arrays import Array
 
 #: Headers that must be the same in all files, and their meanings.
 _SAME = {

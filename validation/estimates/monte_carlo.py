@@ -31,9 +31,9 @@ from reference.scene.read import read_reference
 from reference.storage.cache import cache_folder, drop_arrays
 from reference.storage.files import NO_SPACE
 from reference.storage.kept import Spent, add_spent, is_damaged, is_kept, key_of, load, stopwatch, store
+from validation.arrays import Counted
 from validation.estimates.quadrature import check_camera, check_rays
 
-Progress = Callable[[int, int, str], None]
 Trace = Callable[[int], Batches]  # from the seed
 
 ESTIMATORS = ("single-scatter", "volpath", "cloud-paths")
@@ -68,7 +68,7 @@ def monte_carlo_batches(
     orders: tuple[str, ...] | None = None,
     enough: Callable[[Batches], bool] | None = None,
     go_on: Callable[[int], bool] | None = None,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
     elsewhere: Elsewhere | None = None,
 ) -> Run:
     """Return batches, radiances [W/(m^2 sr)], of a Mitsuba scene at its own size.

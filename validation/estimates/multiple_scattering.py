@@ -14,14 +14,12 @@ biased by about s_R^2, which is far below its interval. The interval is Student'
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference.monte_carlo.batches import LAYERS
+from validation.arrays import Array
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.statistics.records import Fraction, MultipleScattering
 from validation.statistics.samples import student_quantile
-
-Array = NDArray[np.float64]
 
 
 def multiple_scattering_fraction(

@@ -40,9 +40,7 @@ from reference.scene.convex_bounds import holds
 from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from reference.storage.exr import TOTAL
 from reference.storage.kept import kept, load, stopwatch, store
-
-Array = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
+from validation.arrays import Array, Bools, Counted
 
 _ROUNDING = 2.0**-24
 
@@ -55,7 +53,7 @@ def reference_image(
     pixel: str = "centre",
     points: int | None = None,
     *,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
 ) -> ReferenceImage:
     """Return the quadrature reference of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
 
@@ -84,7 +82,7 @@ def _checked_image(
     settings: Mapping[str, Any],
     *,
     keep: Keep | None = None,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
 ) -> ReferenceImage:
     """Return the reference of an image whose every value is finite."""
     check_camera(reference)
@@ -191,7 +189,7 @@ def _scatters(reference: ReferenceScene, light: ReferenceLight) -> bool:
     return bool(np.any(medium.largest * medium.albedo * light.intensity > 0))
 
 
-def _looks_along(light: ReferenceLight, direction: Array) -> NDArray[np.bool_]:
+def _looks_along(light: ReferenceLight, direction: Array) -> Bools:
     """Return which rays through a light pass its cone, before it or behind it."""
     if light.axis is None:
         return np.ones(len(direction), dtype=bool)

@@ -23,15 +23,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.quadrature.fields import field_of
 from reference.scene.density_grid import GridMedium
 from reference.scene.read import ReferenceScene
+from validation.arrays import Array, Index
 from validation.columns import column
 
-Array = NDArray[np.float64]
 Look = Callable[[Array], Array]  # fractions of a ray, any shape -> optical depth of the whole ray if all were as there
 
 _ORDER_0, _SURE, _RATE = 0.9, 2, 2.0  # of the roulette
@@ -66,7 +65,7 @@ def jackknife(depth: Array) -> Array:
     return np.exp(-depth.mean(axis=1)) * np.cos(0.5 * (depth[:, 0] - depth[:, 1]))
 
 
-def orders(random: np.random.Generator, times: int) -> NDArray[np.int64]:
+def orders(random: np.random.Generator, times: int) -> Index:
     """Return random orders of the power series."""
     chosen = np.where(random.random(times) < _ORDER_0, 0, _SURE)
     going = np.flatnonzero(chosen)

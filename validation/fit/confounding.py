@@ -13,11 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from validation.arrays import Array
 from validation.fit.unknowns import Unknown
-
-Array = NDArray[np.float64]
 
 _ZERO = 1e-6  # singular value over the largest: rounding of float64 sums is 1e-12, real dependence on anything 1e-4
 _SILENT = 1e-12  # length of a column over the longest: a parameter that does nothing

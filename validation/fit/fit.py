@@ -9,14 +9,13 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.storage.exr import Image
+from validation.arrays import Array, Bools, Progress
 from validation.columns import plain
 from validation.engine.judged_layer import judged_layer
 from validation.engine.seen import (
-    Progress,
     Seen,
     at_places,
     decide_pixel,
@@ -40,8 +39,6 @@ from validation.fit.unknowns import Unknown, read_unknowns
 from validation.fog_model.radiance import scene_fog
 from validation.metrics.errors import FLOOR
 from validation.scenes.loading import LoadedScene
-
-Array = NDArray[np.float64]
 
 _MOVES = 12  # rounds in which lit intervals are found again
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more
@@ -143,7 +140,7 @@ def fit_image(
     layer: str | None = None,
     holds: str | None = None,
     pixel: str | None = None,
-    mask: NDArray[np.bool_] | None = None,
+    mask: Bools | None = None,
     starts: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> Fit:

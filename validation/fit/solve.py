@@ -42,15 +42,12 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
+from validation.arrays import Array, Bools
 from validation.engine.seen import Seen
 from validation.fit.unknowns import Unknown, with_values
 from validation.fog_model.radiance import Fog, FogModel, scene_fog
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SIGMAS = 1.959964  #: standard errors in half of a 95 % interval
 

@@ -26,11 +26,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError, nearest
 from analytic.height_fog import HeightFog
 from reference.scene.read import ReferenceScene
+from validation.arrays import Array
 from validation.fog_model.radiance import Fog
 from validation.fog_model.view import light_sources
 
@@ -152,7 +152,7 @@ def read_unknowns(
     return tuple(_started(unknown, starts) for unknown in unknowns)
 
 
-def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[float] | NDArray[np.float64]) -> Fog:
+def with_values(unknowns: Sequence[Unknown], fog: Fog, inner: Sequence[float] | Array) -> Fog:
     """Return the fog with the values of parameters, given as numbers on the whole line."""
     for unknown, value in zip(unknowns, inner, strict=True):
         fog = unknown.put(fog, unknown.outward(value))

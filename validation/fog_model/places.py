@@ -24,7 +24,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.panels import equal_panels
 from reference.quadrature.height_fog import fog_of
@@ -38,10 +37,7 @@ from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.visibility.line_crossings import crossings
 from reference.visibility.planes import falloff, rays_at
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from validation.arrays import Array, Bools, Index
 
 AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
 

@@ -21,16 +21,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.height_fog import HeightFog
 from reference.quadrature.height_fog import fog_of
 from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceScene
+from validation.arrays import Array
 from validation.fog_model.places import AROUND, Places
 from validation.fog_model.view import Ends, LightPaths, View
 
-Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
 PhaseLaw = Callable[[Array], Array]  #: of the cosine of the scattering angle, of mean 1 over the sphere
 

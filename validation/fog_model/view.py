@@ -11,7 +11,6 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from reference.quadrature.light_airlight import lit_rays
 from reference.quadrature.replicates import PointPlan, square_points
@@ -28,11 +27,9 @@ from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.exact_distance import exact_distance
 from reference.visibility.lit_intervals import obstacles
+from validation.arrays import Array, Bools, Index
 from validation.fog_model.places import Places, lengths, no_places, parallel_nodes, point_nodes, surface_points
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Light = ReferenceLight | DirectionalLight
 #: Distances between which a fog is [m], and of what: 'planes' before the camera or 'spheres' around it; 'depth': the
 #: depth of the surface taken for the distance along the ray.

@@ -24,14 +24,13 @@ from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import named_phase
+from validation.arrays import Counted
 from validation.clock import time_repeated, timing_of
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE, Kernel, relative_error
 from validation.kernels.rays import wide_rays
 from validation.kernels.records import KernelCost, RayTime
 from validation.study.configuration import find_kernel, sized, split_name
-
-Progress = Callable[[int, int, str], None]
 
 RAYS = 480_000  # 800 x 600
 ERROR_RAYS = 6000
@@ -53,7 +52,7 @@ def bench_kernels(
     names: Sequence[str] | None = None,
     *,
     phases: Sequence[tuple[str, float]] = PHASES,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
 ) -> list[KernelCost]:
     """Measure kernels, all of the registry by default: 'name' stands for all its sizes, 'name-N' for one.
 

@@ -17,15 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
 from analytic.phase import PhaseFunction, phase_from_words
+from validation.arrays import Array, Bools
 from validation.readers import read_csv
-
-Array = NDArray[np.float64]
 
 _RAY = ("ox", "oy", "oz", "dx", "dy", "dz", "lx", "ly", "lz")
 _FOOT = ("t", "h")
@@ -217,7 +215,7 @@ class _Table:
         self.check(name, fine, "a finite number")
         return values
 
-    def check(self, name: str, fine: NDArray[np.bool_], wanted: str) -> None:
+    def check(self, name: str, fine: Bools, wanted: str) -> None:
         """Refuse the column `name` where a row is not `fine`, (rows,); `wanted` says what it should be.
 
         Raises InputError with the first such cell.

@@ -11,7 +11,7 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
@@ -21,10 +21,10 @@ from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import named_phase
 from reference.storage.files import write_text
+from validation.arrays import Array, Bools, Index
 from validation.kernels.case_files import Cases
 from validation.study.configuration import find_kernel
 
-Array = NDArray[np.float64]
 Kernel = Callable[..., Any]
 
 #: Largest number of a case in a precision: its square must be one too [m, 1/m].
@@ -42,7 +42,7 @@ class Values:
 
     J: Array  #: (n,) [1/m]
     refused: dict[str, str]  #: phase function -> the kernel's words
-    accepted: NDArray[np.bool_]  #: (n,) rows that the kernel did not refuse
+    accepted: Bools  #: (n,) rows that the kernel did not refuse
 
 
 def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: Any) -> Values:
@@ -61,7 +61,7 @@ def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: An
 
 def evaluate_rows(
     cases: Cases,
-    rows: NDArray[np.int64],
+    rows: Index,
     function: Kernel,
     precision: str,
     *,

@@ -33,16 +33,13 @@ from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.phase import PhaseFunction, phase_from_words
+from validation.arrays import Array, Bools
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE, Values, relative_error
 from validation.kernels.rays import case_row
 from validation.kernels.records import KernelErrors
-
-Array = NDArray[np.float64]
-Rows = NDArray[np.bool_]
 
 _NODES = 8
 _LARGEST_DEPTH = 87.0
@@ -50,7 +47,7 @@ _FARTHEST = 2.0**63  # [m]
 _SMALLEST = {"single": 2.0**-126, "double": 2.0**-1022}
 
 
-def groups(cases: Cases) -> dict[str, Rows]:
+def groups(cases: Cases) -> dict[str, Bools]:
     """Return which rows belong to 'all', to each tag and to each phase function (as 'phase NAME')."""
     groups = {"all": np.ones(len(cases.phase), dtype=bool)}
     if cases.tag is not None:
@@ -80,14 +77,14 @@ def _peak(name: str, g: float) -> float:
     return float(np.max(phase(np.array([-1.0, 1.0]))))
 
 
-def errors_by_group(cases: Cases, values: Values, precision: str, rows: Mapping[str, Rows]) -> dict[str, KernelErrors]:
+def errors_by_group(cases: Cases, values: Values, precision: str, rows: Mapping[str, Bools]) -> dict[str, KernelErrors]:
     """Return the relative errors [1] of each group of rows, against the value of the cases."""
     assert cases.value is not None
     error = relative_error(values.J, cases.value, precision, underflow_allowance(cases, precision))
     return {name: _errors(cases, values, error, np.isfinite(cases.value), group) for name, group in rows.items()}
 
 
-def _errors(cases: Cases, values: Values, error: Array, known: Rows, group: Rows) -> KernelErrors:
+def _errors(cases: Cases, values: Values, error: Array, known: Bools, group: Bools) -> KernelErrors:
     tried = group & values.accepted
     J, finite = values.J[tried], np.isfinite(error) & tried
     bad = tried & known & ~np.isfinite(values.J)

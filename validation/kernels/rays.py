@@ -15,15 +15,13 @@ Two sets, each the same on every machine:
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from analytic.phase import PHASE_NAMES
 from reference.storage.kept import kept
+from validation.arrays import Array
 from validation.kernels.case_files import Cases, integrate_cases
 from validation.kernels.cases import TABLE
-
-Array = NDArray[np.float64]
 
 COLUMNS = ("tag", "phase", "g", "t", "h", "x0", "x1", "sigma_t", "value")
 

@@ -4,20 +4,19 @@
 The certified values are the files of `validation.certified`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from realtime.kernels.registry import KERNELS
+from validation.arrays import Bools, Counted
 from validation.certified.files import certified_data
 from validation.kernels.case_files import Cases, read_cases
 from validation.kernels.cases import Kernel, Values, evaluate_cases
-from validation.kernels.errors import Rows, errors_by_group, groups
+from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays
 from validation.kernels.records import Rays, Stability
 from validation.study.configuration import find_kernel
-
-Progress = Callable[[int, int, str], None]
 
 CERTIFIED = ("airlight_integral.csv", "airlight_integral_rays.csv")
 GENERATED = "generated"
@@ -37,7 +36,7 @@ BAR = {
 
 
 def stability(
-    names: Sequence[str] | None = None, *, count: int = 100_000, progress: Progress | None = None
+    names: Sequence[str] | None = None, *, count: int = 100_000, progress: Counted | None = None
 ) -> list[Stability]:
     """Study kernels, all of the registry by default, on the certified rays and on so many generated ones."""
     chosen = [(name, find_kernel(name)) for name in names or KERNELS]  # refuse a wrong name before any work
@@ -75,7 +74,7 @@ def claims_exact(name: str) -> bool:
 def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
     """Return what a kernel that claims to be exact does not keep, in words."""
     sharp, smooth = np.abs(cases.g) > 0.9, np.asarray(cases.phase) != "tabulated"
-    rows: dict[str, Rows] = {
+    rows: dict[str, Bools] = {
         "all": np.ones(len(sharp), dtype=bool),
         "smooth": smooth,
         "g up to 0.9": smooth & ~sharp,

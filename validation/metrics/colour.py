@@ -23,13 +23,12 @@ takes a second.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analytic.errors import InputError
+from validation.arrays import Array
 from validation.columns import column
 from validation.metrics.errors import colours, compared
-
-Array = NDArray[np.float64]
 
 WHITE_LUMINANCE = 203.0  #: luminance of white [cd/m^2], the reference white of BT.2408
 PEAK_LUMINANCE = 1000.0  #: the brightest that the screen shows [cd/m^2]

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analytic.errors import InputError
+from validation.arrays import Array, Bools
 from validation.columns import column
 
 FLOOR = 1e-3  #: the least denominator of a relative error, as a fraction of the mean of the reference
@@ -100,9 +101,7 @@ def known(value: float | None) -> float:
     return value
 
 
-def compared(
-    reference: ArrayLike, test: ArrayLike, mask: ArrayLike | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+def compared(reference: ArrayLike, test: ArrayLike, mask: ArrayLike | None) -> tuple[Array, Array, Bools]:
     """Return two images as float64, (height, width, channels), and the pixels to compare, (height, width).
 
     Images of different sizes, empty ones, and a mask that does not fit or leaves nothing are refused.
@@ -122,7 +121,7 @@ def compared(
     return ref.reshape(*ref.shape[:2], -1), tst.reshape(*tst.shape[:2], -1), chosen
 
 
-def wrong_pixels(wrong: NDArray[np.bool_], what: str) -> tuple[str, ...]:
+def wrong_pixels(wrong: Bools, what: str) -> tuple[str, ...]:
     """Return how many pixels, (height, width), are wrong and where the first is, in words; nothing where none is."""
     if not wrong.any():
         return ()
@@ -133,7 +132,7 @@ def wrong_pixels(wrong: NDArray[np.bool_], what: str) -> tuple[str, ...]:
     return (f"{many} pixels are {what}, the first in column {column}, row {row}",)
 
 
-def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
+def colours(image: Array) -> Array:
     """Return an image, (height, width, channels), with three channels; one becomes grey, other numbers are refused."""
     if image.shape[2] not in (1, 3):
         raise InputError(
@@ -142,7 +141,7 @@ def colours(image: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
 
 
-def _size(image: NDArray[np.float64]) -> str:
+def _size(image: Array) -> str:
     """Say the size of an image as width x height."""
     if image.ndim not in (2, 3):
         return f"an array of shape {image.shape}"

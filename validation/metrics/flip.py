@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
+from validation.arrays import Array
 from validation.columns import column
 from validation.metrics.errors import colours, compared
 
@@ -121,7 +122,7 @@ def exposure_range(reference: ArrayLike) -> tuple[float, float]:
     return start, stop
 
 
-def _unanswerable(ref: NDArray[np.float64], tst: NDArray[np.float64]) -> str:
+def _unanswerable(ref: Array, tst: Array) -> str:
     """Say why FLIP has no answer for these pixels; empty if it has one."""
     for name, pixels in (("reference", ref), ("test image", tst)):
         for what, wrong in (("NaN or infinite", ~np.isfinite(pixels)), ("negative", pixels < 0)):

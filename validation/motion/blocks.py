@@ -9,9 +9,8 @@ these matrices are kept. Blocks are collected in at most `GROUPS` groups, neighb
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from validation.arrays import Array
 
 BLOCK = 8  #: side of a block [pixels]
 GROUPS = 100  #: their scatter gives a standard error to 7 %

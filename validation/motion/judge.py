@@ -19,26 +19,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.scene.camera import film_positions
 from reference.scene.read import ReferenceScene, read_reference
 from reference.storage.exr import NOTE, read_exr
 from reference.storage.files import temporary_folder
+from validation.arrays import Array, Bools, Index, Progress
 from validation.columns import plain
 from validation.engine.judge import lamp_distance, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
-from validation.engine.seen import PIXELS, Progress, pixel_kinds, scene_of_size
+from validation.engine.seen import PIXELS, pixel_kinds, scene_of_size
 from validation.estimates.quadrature import reference_image
 from validation.motion.blocks import BLOCK, told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from validation.motion.measures import AGES, Measures, Sequence, measure
 from validation.scenes.changes import move_shapes, shift_film
 from validation.scenes.loading import load_scene
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 _ROUNDING = 1e-6  # relative error of exact frames in files of float32
 _TOLD = 0.25  # largest error of a lag that is told [frames]
@@ -298,7 +295,7 @@ def _blocks(some: Bools) -> slice:
     return slice(places[0] // BLOCK * BLOCK, (places[-1] // BLOCK + 1) * BLOCK)
 
 
-def _pixel_of(reference: ReferenceScene, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Bools]:
+def _pixel_of(reference: ReferenceScene, points: Array) -> tuple[Index, Index, Bools]:
     """Return row and column of the pixels that show points, and whether these lie in the image."""
     size = reference.width, reference.height
     place = np.floor(film_positions(reference.scene.sensors()[0], points - reference.origin, size))

@@ -22,12 +22,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear, minimize_scalar
 
+from validation.arrays import Array
 from validation.motion.blocks import BLOCK, UNKNOWN, Estimate, estimates, held, products
-
-Array = NDArray[np.float64]
 
 CELL = 4  #: side of a cell [pixels]
 TAPS = 16  #: of the impulse response [frames]

@@ -27,14 +27,12 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from validation.arrays import Array, Bools
 from validation.motion.blocks import UNKNOWN, Estimate, products, regression, relative_root
 from validation.motion.lag import CELL, DARK, Cells, Lag, filtered_frames, fit_lag
 from validation.statistics.comparison import block_sums
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 _Record = TypeVar("_Record", "Measures", Lag)
 
 AGES = 12  #: of light that left [frames]

@@ -35,22 +35,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 from scipy.stats import nct
 
 from analytic.errors import InputError
 from reference.storage.exr import read_exr
+from validation.arrays import Array, Progress
 from validation.columns import plain
 from validation.engine.images import image_times
 from validation.engine.judge import fitting_kind, references, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
-from validation.engine.seen import Progress, pixel_kinds, scene_of_size
+from validation.engine.seen import pixel_kinds, scene_of_size
 from validation.motion.blocks import Estimate, parts_of_error, told
 from validation.statistics.samples import student, student_quantile
-
-Array = NDArray[np.float64]
 
 RINGS = 8  #: of the error spectrum, from 0 to 1/2 cycle a pixel
 BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]

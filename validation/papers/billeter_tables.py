@@ -22,6 +22,7 @@ from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeError
 from realtime.frame.renderer import Frame, FrameRenderer, render_frame
 from realtime.scene.read_scene import Scene, read_scene
+from validation.arrays import Array
 from validation.clock import time_repeated, timed
 from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
@@ -29,8 +30,6 @@ from validation.scenes.loading import load_scene, resize
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
 from validation.study.frame_times import moved_light
-
-Array = NDArray[np.float64]
 
 SIZE = (1024, 1024)  #: of the published images [pixels]
 MAPS = (1024, 2048, 4096)  #: of Table 1 [texels]

@@ -16,7 +16,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.clouds.canonical.coordinates import SETS, order_layer
 from realtime.clouds.collector_search import Collector
@@ -25,6 +24,7 @@ from realtime.methods.registry import METHODS
 from realtime.scene.mesh_adjacency import mesh_triangles
 from realtime.scene.read_scene import Scene, read_scene
 from reference.scene.clouds import CloudScene, read_clouds
+from validation.arrays import Array, Bools, Progress
 from validation.clock import time_repeated
 from validation.estimates.images import Budget, monte_carlo_reference
 from validation.scenes.loading import LoadedScene, load_scene, resize
@@ -32,9 +32,6 @@ from validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
 from validation.scenes.registry import SCENES
 from validation.study.frame_times import first_frame
 from validation.timing import Timing
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 SIZE, SAMPLES = (80, 60), 512
 _FEWER = 4  #: times as few in Fig. 11, of which means over pixels are compared
@@ -68,7 +65,7 @@ def clouds_figures() -> dict[str, Any]:
     return figures
 
 
-def _ratio(image: Array, reference: Array, error: Array, where: NDArray[np.bool_]) -> list[float]:
+def _ratio(image: Array, reference: Array, error: Array, where: Bools) -> list[float]:
     """Return the light of an image over that of the reference in some pixels, with the ends of its interval."""
     light, expected = image[where].sum(), reference[where].sum()
     # Errors of colours of one pixel come from the same paths; they are added, not their squares.
@@ -123,7 +120,7 @@ def pair_of(loaded: LoadedScene, samples: int, progress: Progress | None = None)
     return method, paths, error
 
 
-def _shaded(clouds: CloudScene) -> NDArray[np.bool_]:
+def _shaded(clouds: CloudScene) -> Bools:
     """Return which pixel-centre rays meet a cloud at a point whose way to the sun leaves the cloud and enters again."""
     toward = -np.asarray(clouds.suns[0].direction, dtype=np.float64)
     first = clouds.scene.ray_intersect(_rays(np.broadcast_to(clouds.origin, clouds.direction.shape), clouds.direction))
@@ -143,7 +140,7 @@ def _rays(origin: Array, direction: Array) -> Any:
     return mi.Ray3f(mi.Point3f(np.ascontiguousarray(origin.T)), mi.Vector3f(np.ascontiguousarray(direction.T)))
 
 
-def _two_collectors(loaded: LoadedScene) -> NDArray[np.bool_]:
+def _two_collectors(loaded: LoadedScene) -> Bools:
     """Return the pixels in which two searches end apart in some set of orders, both with light, (height, width)."""
     sides = [_searched_from(read_scene(loaded.scene), aside) for aside in (-_ASIDE, _ASIDE)]
     found = []

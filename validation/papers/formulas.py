@@ -21,7 +21,6 @@ from itertools import product
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from analytic.droplets import Modified, optics
@@ -29,13 +28,12 @@ from analytic.phase import PhaseFunction
 from analytic.series import taylor_coefficients
 from realtime.kernels.exact import exact
 from realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
+from validation.arrays import Array, Bools
 from validation.columns import column
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import Kernel, evaluate_cases
 from validation.kernels.rays import wide_rays
 from validation.metrics.errors import known
-
-Array = NDArray[np.float64]
 
 _RAYS, _WIDE_RAYS = 48, 1 << 13
 _HAZY = PhaseFunction("hazy")
@@ -179,14 +177,14 @@ def relative_errors(cases: Cases, function: Kernel) -> Array:
     return np.where(np.isfinite(error), error, np.inf)
 
 
-def _moderate(cases: Cases) -> NDArray[np.bool_]:
+def _moderate(cases: Cases) -> Bools:
     distance = np.hypot(cases.foot, cases.height)  # and optical depth: the extinction of the set is 1
     length = cases.x1 / distance
     fine = (distance >= 0.01) & (distance <= 5) & (length >= 0.05) & (length <= 10)
     return fine & (cases.height >= distance * np.sin(np.radians(1)))
 
 
-def _near_foot(cases: Cases) -> NDArray[np.bool_]:
+def _near_foot(cases: Cases) -> Bools:
     ends = [np.abs(np.arctan2(x - cases.foot, cases.height)) for x in (cases.x0, cases.x1)]
     return np.maximum(*ends) <= _NEAR_FOOT
 

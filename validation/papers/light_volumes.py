@@ -20,7 +20,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.geometry import foot_and_height
 from analytic.panels import airlight_segments
@@ -33,6 +32,7 @@ from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
 from reference.scene.read import read_reference
+from validation.arrays import Array, Bools, Index
 from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics, known
@@ -42,8 +42,6 @@ from validation.scenes.parts import mitsuba_mesh
 from validation.scenes.registry import SCENES
 from validation.study import configuration as methods
 from validation.study.frame_times import moved_light
-
-Array = NDArray[np.float64]
 
 MAP = 512  #: of the colonnade, six faces, and of the sphere [texels]
 SIZE = (160, 120)  #: of images [pixels]
@@ -137,7 +135,7 @@ def corner_heights(shadow_map: ShadowMap) -> Array:
     return np.array(inverse_depth(shadow_map)).reshape(shadow_map.faces, side, side)
 
 
-def quad_levels(divided: list[Any]) -> NDArray[np.int64]:
+def quad_levels(divided: list[Any]) -> Index:
     """Return the level of the quad in which each texel lies, (faces, size, size); 0 is a whole face."""
     size = 2 ** len(divided)
     level = np.zeros((len(divided[0]), size, size), dtype=np.int64)
@@ -150,7 +148,7 @@ def quad_levels(divided: list[Any]) -> NDArray[np.int64]:
     return level
 
 
-def _jumps(heights: Array) -> NDArray[np.bool_]:
+def _jumps(heights: Array) -> Bools:
     """Return the texels whose corners differ by more than a tenth."""
     corners = np.stack([heights[:, a : a - 1 or None, b : b - 1 or None] for a in (0, 1) for b in (0, 1)])
     return np.ptp(corners, axis=0) > 0.1 * corners.max(axis=0)
@@ -184,7 +182,7 @@ def laplacian(heights: Array) -> Array:
     return np.abs(around - 4 * depth)
 
 
-def _marked(corners: NDArray[np.bool_]) -> list[Any]:
+def _marked(corners: Bools) -> list[Any]:
     """Return the nodes of each level that have a marked corner."""
     marked = corners[:, :-1, :-1] | corners[:, 1:, :-1] | corners[:, :-1, 1:] | corners[:, 1:, 1:]
     levels = []

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.frame.renderer import render_frame
 from realtime.methods.light_volumes.published.mesh import THRESHOLD
@@ -18,13 +17,12 @@ from realtime.methods.light_volumes.published.tessellation import divide, edges,
 from realtime.scene.animate import thicker_medium
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map
+from validation.arrays import Array
 from validation.papers.light_volumes import corner_heights, plain_edges, quad_levels
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import point_light
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
-
-Array = NDArray[np.float64]
 
 _FACE = 1  # of the six, the one that sees the columns
 

@@ -19,11 +19,11 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import Scene, read_scene
 from reference.monte_carlo.batches import LAYERS
+from validation.arrays import Array
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.metrics.errors import error_metrics, known
@@ -31,8 +31,6 @@ from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
-
-Array = NDArray[np.float64]
 
 _SCENES = ("open-fog", "two-pens", "colonnade")
 _SIZE = (32, 24)  # of the images of multiple scattering [pixels]

@@ -17,19 +17,17 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.geometry import foot_and_height
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_reference
+from validation.arrays import Array, Bools
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import Metrics, error_metrics, known
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera, fog, point_light
 from validation.study.configuration import configuration, prepared
-
-Array = NDArray[np.float64]
 
 SIZE = (160, 120)  #: of the images [pixels]
 SCENES = ("two-pens", "clutter", "hall", "colonnade")  #: whose planes are ordered
@@ -96,7 +94,7 @@ def _lamp_in_fog(depth: float) -> dict[str, Any]:
     }
 
 
-def _close_to_lamp(scene: Any) -> NDArray[np.bool_]:
+def _close_to_lamp(scene: Any) -> Bools:
     reference = read_reference(scene)
     foot, height = foot_and_height(reference.origin, reference.direction, reference.lights[0].position)
     return (np.arctan2(height, foot) < np.radians(10)).reshape(reference.height, reference.width)

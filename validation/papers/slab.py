@@ -14,7 +14,6 @@ from typing import Any
 
 import drjit as dr
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.droplets import Modified, optics
 from realtime.clouds.canonical.coordinates import SETS, set_name
@@ -23,10 +22,9 @@ from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.transport_grid import Transport, canonical_transport, on_device
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
 from realtime.numerics.array_types import ArrayTypes, array_types
+from validation.arrays import Array
 from validation.slab.moments import SlabOrders, order_sets
 from validation.slab.phases import droplet_phase, phase_pair
-
-Array = NDArray[np.float64]
 
 THICKNESSES = (50.0, 100.0, 300.0, 1000.0)  #: [m]
 _SUNS = (0.0, 75.0)  # [degrees]

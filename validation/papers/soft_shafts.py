@@ -25,18 +25,16 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.frame.renderer import render_frame, run_cast_and_shade
 from realtime.scene.read_scene import Scene, read_scene
+from validation.arrays import Array, Bools
 from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
 from validation.study.configuration import SHARED_POINTS, Configuration, prepared
 from validation.study.frame_times import moved_light
 from validation.timing import Timing
-
-Array = NDArray[np.float64]
 
 SCENE, SIZE = "fence", (200, 152)  #: of the frames [pixels]; the source prints none
 POINTS = 64
@@ -68,7 +66,7 @@ class Reference:
     """The quadrature of the scene."""
 
     image: Array  #: airlight plus surface, (height, width, 3) [W/(m^2 sr)]
-    penumbra: NDArray[np.bool_]  #: (height, width)
+    penumbra: Bools  #: (height, width)
 
     def error(self, image: Array, left_out: int | None = None) -> float:
         """Return the relative RMSE of an image in the penumbra, if wanted without one of the strips."""
@@ -124,7 +122,7 @@ def shafts_reference(size: tuple[int, int]) -> Reference:
     return Reference(image, penumbra(read_scene(loaded)))
 
 
-def penumbra(scene: Scene) -> NDArray[np.bool_]:
+def penumbra(scene: Scene) -> Bools:
     """Return where the visible surface gets a part of the light, with and without occluders from the same points."""
     surface = render_frame(prepared(scene, _exact(_FEW))).surface
     lit = prepared(scene, Configuration("soft-shafts", None, (("points", _FEW), ("pattern", "sobol"), ("map", 4))))

@@ -8,11 +8,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.scene.read_scene import Scene
-
-Array = NDArray[np.float64]
+from validation.arrays import Array, Bools
 
 _BEFORE = 1e-3  # of its way a shadow ray leaves out at either end
 
@@ -74,7 +72,7 @@ def distance(geometry: Any, origin: Array, direction: Array) -> Array:
     return found.reshape(direction.shape[:-1])
 
 
-def lit_points(geometry: Any, light: LightPlace, points: Array) -> NDArray[np.bool_]:
+def lit_points(geometry: Any, light: LightPlace, points: Array) -> Bools:
     """Return which points a light reaches, the middle of one with extent; points (..., 3) [m]."""
     unit, distance = light.toward(points)
     lit = np.ones(points.shape[:-1], dtype=bool)

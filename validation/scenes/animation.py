@@ -18,7 +18,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.area_lights.shape import turned_area_light
@@ -36,10 +35,9 @@ from realtime.scene.animate import (
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.mesh_adjacency import read_occluders
 from realtime.scene.read_scene import Scene
+from validation.arrays import Array
 from validation.scenes.meshes import rotation
 from validation.scenes.registry import MOVES, Animation
-
-Array = NDArray[np.float64]
 
 
 def parse_moves(text: str) -> tuple[str, ...]:

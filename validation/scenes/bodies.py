@@ -13,7 +13,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -23,8 +22,7 @@ from realtime.numerics.array_types import aligned_array
 from realtime.scene.closed_mesh import ClosedMesh, encloses, shape_number, winding_number
 from realtime.scene.convex_bounds import FLAT, Bounds, holds, read_bounds
 from realtime.scene.mesh_adjacency import scene_of
-
-Array = NDArray[np.float64]
+from validation.arrays import Array, Index
 
 _SIDE = 1e-6  # of the length of an edge, and of the weights of a corner: what lies nearer to an end only touches it
 
@@ -181,7 +179,7 @@ def _check_crossings(meshes: Sequence[ClosedMesh | None], shapes: Sequence[Any])
             )
 
 
-def _edges(mesh: ClosedMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _edges(mesh: ClosedMesh) -> tuple[Index, Index]:
     """Return the numbers of the two vertices of every edge, each edge once."""
     tail, head = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     return tail[tail < head], head[tail < head]

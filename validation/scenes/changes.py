@@ -26,13 +26,12 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError, named_values, nearest
+from validation.arrays import Array
 from validation.scenes.height_fog import NUMBERS
 from validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
 
-Array = NDArray[np.float64]
 Values = tuple[float, ...]
 _LIGHTS = {"intensity": "W/sr", "irradiance": "W/m^2", "radiance": "W/(m^2 sr)"}
 

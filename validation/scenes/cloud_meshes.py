@@ -7,11 +7,9 @@ Both have one radius or one height a direction or place, so that they cross them
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from validation.arrays import Array
 from validation.scenes.meshes import Mesh, icosphere
-
-Array = NDArray[np.float64]
 
 _STEPS = 160  # of the search along a direction
 _BASE = 713.0  # height of the base of the cumulus [m]

@@ -16,9 +16,8 @@ t^5 - 15 t^4 + 10 t^3. It is continuous with its first two derivatives, 0 at the
 import numpy as np
 from numpy.typing import NDArray
 
+from validation.arrays import Array, Bools, Index
 from validation.scenes.meshes import Mesh
-
-Array = NDArray[np.float64]
 
 NOISE_BOUND = 0.75**0.5  #: of one octave: half the diagonal of a cell, between its corners' planes
 SAMPLING = 11.0  #: between the points of a mesh of which the nearest is taken [m]
@@ -98,7 +97,7 @@ def grid_points(low: Array, high: Array, counts: tuple[int, int, int]) -> Array:
     return np.stack([x, y, z], axis=-1)
 
 
-def inside(mesh: Mesh, points: Array) -> NDArray[np.bool_]:
+def inside(mesh: Mesh, points: Array) -> Bools:
     """Return which points of a lattice, as of `grid_points`, lie within a closed mesh, (z, y, x)."""
     vertices, faces = mesh
     x, y, z = points[0, 0, :, 0], points[0, :, 0, 1], points[:, 0, 0, 2]
@@ -145,7 +144,7 @@ def distance_into(mesh: Mesh, points: Array) -> Array:
     return np.asarray(cKDTree(np.unique(np.concatenate(samples), axis=0)).query(points)[0])
 
 
-def _gradients(cell: NDArray[np.int64], seed: int) -> Array:
+def _gradients(cell: Index, seed: int) -> Array:
     """Return unit vectors by whole coordinates, (n, 3): `pcg3d` of Jarzynski and Olano 2020, in wrapping integers."""
     v = (cell + np.array([seed, 3 * seed + 1, 7 * seed + 5])).astype(np.uint32)
     v = v * np.uint32(1664525) + np.uint32(1013904223)

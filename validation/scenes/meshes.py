@@ -10,12 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Vertices = NDArray[np.float64]  #: (vertices, 3) [m]
-Faces = NDArray[np.int64]  #: (faces, 3), counter-clockwise as seen from outside
+from validation.arrays import Array, Index
+
+Vertices = Array  #: (vertices, 3) [m]
+Faces = Index  #: (faces, 3), counter-clockwise as seen from outside
 Mesh = tuple[Vertices, Faces]
 
 
-def rotation(axis: ArrayLike, degrees: float) -> NDArray[np.float64]:
+def rotation(axis: ArrayLike, degrees: float) -> Array:
     """Return the matrix, (3, 3), of a rotation about an axis through the origin by an angle [degrees] (Rodrigues)."""
     x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -23,7 +25,7 @@ def rotation(axis: ArrayLike, degrees: float) -> NDArray[np.float64]:
     return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * (skew @ skew)
 
 
-def placed(mesh: Mesh, position: ArrayLike, turn: NDArray[np.float64] | None = None) -> Mesh:
+def placed(mesh: Mesh, position: ArrayLike, turn: Array | None = None) -> Mesh:
     """Return a mesh turned about the origin by a matrix, (3, 3), then moved by `position`, (3,) [m]."""
     vertices, faces = mesh
     return (vertices if turn is None else vertices @ turn.T) + np.asarray(position), faces
@@ -175,7 +177,7 @@ def prism(outline: ArrayLike, height: float) -> Mesh:
     return skin([np.column_stack([outline, np.full(len(outline), z)]) for z in (0.0, height)])
 
 
-def star(inner: float, outer: float, points: int) -> NDArray[np.float64]:
+def star(inner: float, outer: float, points: int) -> Array:
     """Return the outline of a star about the origin with an inner and an outer radius [m], (2 points, 2) [m]."""
     angle = np.pi * np.arange(2 * points) / points
     return np.where(np.arange(2 * points) % 2, inner, outer)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -11,9 +11,9 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from validation.arrays import Array
 
 LARGEST_LENGTH = 1e9  #: of a coordinate or a radius [m], also of an extinction [1/m]
 LARGEST_LIGHT = 1e18  #: of an intensity [W/sr] or an irradiance [W/m^2]
@@ -63,7 +63,7 @@ def _parameter(parameters: Any, key: str) -> Any:
         return None
 
 
-def _numbers(value: Any) -> NDArray[np.float64] | None:
+def _numbers(value: Any) -> Array | None:
     """Return the numbers of a parameter, None where it has none."""
     if value is None:
         return None
@@ -75,7 +75,7 @@ def _numbers(value: Any) -> NDArray[np.float64] | None:
         return None
 
 
-def _check(name: str, key: str, values: NDArray[np.float64]) -> None:
+def _check(name: str, key: str, values: Array) -> None:
     words = key.split(".")
     if words[-1] in _NO_MATTER:
         return
@@ -92,7 +92,7 @@ def _check(name: str, key: str, values: NDArray[np.float64]) -> None:
         _check_transform(name, key, values.reshape(4, 4))
 
 
-def _check_transform(name: str, key: str, matrix: NDArray[np.float64]) -> None:
+def _check_transform(name: str, key: str, matrix: Array) -> None:
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if scale[-1] < _LEAST_SCALE or scale[-1] < _FLATTEST * scale[0]:
         raise InputError(

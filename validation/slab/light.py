@@ -22,21 +22,20 @@ light. The spread of one axis about the mean, the sigma of Bouthors 2008, is sqr
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.clouds.slab_orders.phases import SlabPhase
 from reference.monte_carlo.slab_walk.estimates import ExitEstimate, SlabEstimate, slab_estimate
 from reference.monte_carlo.slab_walk.walk import Slab
+from validation.arrays import Array, Progress
 from validation.columns import plain
 from validation.slab.moments import SlabOrders, order_sets
 from validation.slab.radiance import slab_radiance
 from validation.slab.request import SlabRequest
 
-Progress = Callable[[float, str], None]
 Exit = tuple[float | None, float | None, float | None]  # light through a plane: amount, mean and rms displacement
 
 #: Streams in each hemisphere: the first of these that leaves less than `_RESOLVED` of the phase function to the peak.
@@ -128,7 +127,7 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
     return {"orders": orders, "total": whole}
 
 
-def _exit(moments: NDArray[np.float64], unit: float) -> Exit:
+def _exit(moments: Array, unit: float) -> Exit:
     amount, first, second = (float(moment) for moment in moments)
     if amount <= 0.0:
         return 0.0, None, None

@@ -35,13 +35,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
 from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
 from realtime.clouds.slab_orders.phases import SlabPhase
-
-Array = NDArray[np.float64]
+from validation.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.droplets import Droplets, Modified, optics
 from analytic.errors import InputError, nearest
@@ -21,9 +20,8 @@ from realtime.droplets import CUT, droplet_series
 from realtime.scene.phase import HgDraine
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
 from reference.monte_carlo.slab_walk.walk import Scattering
+from validation.arrays import Array
 from validation.readers import read_csv
-
-Array = NDArray[np.float64]
 
 NAMES = ("isotropic", "hg:G", "hg-draine", "mie", "mie-modified", "FILE.csv")
 #: |g| up to which the streams resolve Henyey and Greenstein's lobe

@@ -17,13 +17,11 @@ I_m of the exponential source of the beam is known in closed form on the lines o
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
 from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
 from realtime.clouds.slab_orders.phases import SlabPhase
-
-Array = NDArray[np.float64]
+from validation.arrays import Array
 
 #: A mode below this fraction of the source, twice in a row, ends the sum over modes.
 _NEGLIGIBLE = 1e-10

@@ -62,9 +62,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analytic.errors import InputError
+from validation.arrays import Array, Bools
 from validation.columns import record_of
 from validation.metrics.errors import compared
 from validation.statistics.records import Statistics
@@ -77,8 +78,6 @@ from validation.statistics.samples import (
     two_sided_p,
     uniformity_p,
 )
-
-Array = NDArray[np.float64]
 
 BLOCK = 8  #: side of a block [pixels]
 
@@ -158,7 +157,7 @@ def compare_statistics(
 
 
 def _value_tests(
-    expected: _Side, tested: _Side, chosen: NDArray[np.bool_], family_level: float, plain_level: float
+    expected: _Side, tested: _Side, chosen: Bools, family_level: float, plain_level: float
 ) -> dict[str, Any]:
     """Test every value by itself."""
     difference, error = tested.mean - expected.mean, np.hypot(expected.error, tested.error)
@@ -220,7 +219,7 @@ def _check_levels(margin: float | None, family_level: float, plain_level: float)
         raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
 
 
-def _side(name: str, estimate: Estimate, chosen: NDArray[np.bool_], *, scale: float, with_batches: bool) -> _Side:
+def _side(name: str, estimate: Estimate, chosen: Bools, *, scale: float, with_batches: bool) -> _Side:
     """Check one estimate and make it regular: float64 of three dimensions, scaled, zero outside the chosen pixels."""
     shape = np.shape(estimate.mean)
     inside = chosen[:, :, None]

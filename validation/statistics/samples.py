@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtri, stdtr, stdtrit
 
-Array = NDArray[np.float64]
+from validation.arrays import Array
 
 LEVEL = 0.95  #: with at least this probability an interval holds what it estimates
 

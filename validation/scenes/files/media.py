@@ -14,12 +14,10 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from validation.arrays import Array
 from validation.scenes.files.nodes import kind, of_kind, properties, references
-
-Array = NDArray[np.float64]
 
 _OLD = ("sigma_s", "sigma_a")
 

@@ -11,12 +11,10 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from validation.arrays import Array
 from validation.scenes.files.nodes import kind, of_kind, properties, references
-
-Array = NDArray[np.float64]
 
 _FOOT, _HEAD = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)  # of Mitsuba's cylinder
 

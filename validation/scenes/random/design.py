@@ -20,9 +20,9 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from validation.arrays import Array
 from validation.readers import Reader, read_named, read_number, read_table, read_toml
 
 FILE = Path(__file__).with_name("ranges.toml")  #: of ranges as they are drawn without a file of one's own
@@ -88,13 +88,13 @@ class Draws:
                 return word
         return [word for word, weight in weights.items() if weight > 0][-1]
 
-    def vector(self) -> NDArray[np.float64]:
+    def vector(self) -> Array:
         """Return a unit vector, evenly over the sphere, (3,)."""
         z, angle = self.between(-1, 1), self.between(0, 2 * math.pi)
         across = math.sqrt(1 - z * z)
         return np.array([across * math.cos(angle), across * math.sin(angle), z])
 
-    def in_ball(self) -> NDArray[np.float64]:
+    def in_ball(self) -> Array:
         """Return a point within the unit ball, evenly, (3,)."""
         return self.vector() * self.fraction() ** (1 / 3)
 

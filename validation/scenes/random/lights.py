@@ -9,12 +9,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from validation.arrays import Array
 from validation.scenes.random.design import Draws, Ranges
 from validation.scenes.random.media import Medium, depths, unit_airlight, view_rays
-
-Array = NDArray[np.float64]
 
 AREA_KINDS = ("rectangle", "disk", "sphere")
 _FAR = 1e3  # where directional lights come from, in radii of the stage

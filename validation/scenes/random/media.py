@@ -12,13 +12,11 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.phase import phase_from_words
+from validation.arrays import Array
 from validation.properties.view import optical_depths
 from validation.scenes.random.design import Draws, Ranges
-
-Array = NDArray[np.float64]
 
 #: By kind, the radius of a ball that holds the body of half sizes 1, and of one within it.
 _BALLS = {"sphere": (1.0, 1.0), "ellipsoid": (1.0, 0.93), "gem": (1.0, 0.91), "box": (math.sqrt(3), 1.0)}

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from analytic.errors import InputError
 from realtime.scene.mesh_adjacency import mesh_triangles
+from validation.arrays import Array
 from validation.scenes.meshes import (
     Mesh,
     box,
@@ -35,8 +36,6 @@ from validation.scenes.meshes import (
 )
 from validation.scenes.random.design import Draws, Ranges
 from validation.scenes.random.lights import Light
-
-Array = NDArray[np.float64]
 
 _TRIES = 24
 _CAMERA = 0.31  # an occluder is as far from the camera at least, in radii of the stage

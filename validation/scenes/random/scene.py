@@ -15,8 +15,8 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from validation.arrays import Array
 from validation.properties.view import LightPlace, distance, lit_points
 from validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
 from validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
@@ -25,8 +25,6 @@ from validation.scenes.random.lights import AREA_KINDS, Light, draw_lights
 from validation.scenes.random.media import Medium, draw_media
 from validation.scenes.random.occluders import Occluder, draw_ground, draw_occluders
 from validation.scenes.registry import Animation, SceneRecord
-
-Array = NDArray[np.float64]
 
 _ATTEMPTS = 17
 _TABLE = 513  # values of a tabulated phase function
