@@ -15,7 +15,7 @@ class NoDriverError(RuntimeError):
 
 
 def root_of(error: BaseException) -> BaseException:
-    """Return what an exception was raised from first."""
+    """Return the first cause of an exception."""
     while error.__cause__ is not None:
         error = error.__cause__
     return error

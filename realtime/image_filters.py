@@ -190,7 +190,7 @@ class Taps:
 
 
 def taps_of(wide: Margined) -> Taps:
-    """Return what adds up the taps of images with a margin."""
+    """Return a function that adds up the taps of images with a margin."""
     Float = type(wide.values[0])
     return Taps(
         wide,

@@ -50,7 +50,7 @@ class LitIntervals:
 
 
 def no_intervals(zero, start) -> LitIntervals:
-    """Return what rays have at their start.
+    """Return the state of rays at their start.
 
     `zero`: the sum of nothing, one for each ray; `start`: where rays start, one for each [m]: there an interval opens
     if they are lit.

@@ -68,7 +68,7 @@ def light_depths(
     cloud: int,
     stride: Any,
 ) -> LightDepths:
-    """Return what lies between a sun and all points of a cloud.
+    """Return the depths between a sun and all points of a cloud.
 
     `surfaces`, `clouds`: the boundaries, and what fills them, with a density; `light`: a directional light, with an
     extent that holds the clouds; `cloud`: the number of the cloud; `stride`: how long the steps are at most [voxels].

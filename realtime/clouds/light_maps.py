@@ -225,7 +225,7 @@ def _finest(surfaces: LitSurfaces, normal: Any) -> tuple[Any, Any]:
 
 
 def _nearest(coarser: tuple[Any, Any], side: int, hole: Any) -> list[Any]:
-    """Return what holes of a level with so many texels on a side hold: what the next coarser level has there."""
+    """Return the values for holes of a level: those of the next coarser level there."""
     Four, texel = four_numbers(type(coarser[0])), dr.arange(mi.UInt32, side * side)
     row = texel // side
     parent = (row // 2) * (side // 2) + (texel - row * side) // 2

@@ -103,7 +103,7 @@ def lit_dense_surface(
     threshold: float,
     stride: Any,
 ) -> LitSurfaces:
-    """Return what rays along a light meet of one cloud, as `realtime.clouds.light_maps.cast_surfaces` does.
+    """Return the lit surfaces of one cloud along a light, as `realtime.clouds.light_maps.cast_surfaces` does.
 
     `surfaces`, `clouds`, `threshold`, `stride`: as for `dense_surface`; `light`, `size`: as for `cast_surfaces`;
     `cloud`: its number; `body`: by cloud, mean(rho where rho > rho_0) [1].

@@ -168,7 +168,7 @@ def light_once(
 
 
 def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> Any:
-    """Return what is printed for the opacity of clouds, a colour [m]; arguments as of `depths_along`.
+    """Return the printed opacity of clouds, a colour [m]; arguments as of `depths_along`.
 
     Bouthors, Neyret, Max, Bruneton, Crassin 2008, eq. 2.
     """

@@ -142,7 +142,7 @@ def between_corners(method: Method, scene: Scene) -> Method:
 def adaptive_layers(
     render: Render, corners: Corners, pixel: PerRay, distance: Metres, *, width: int, tolerance: float, last: Any
 ) -> Layers:
-    """Return what a method renders of every pixel, interpolated between the corners of tiles where that is enough.
+    """Return the image of a method, interpolated between the corners of tiles where that is enough.
 
     `render`: renders some pixels; `corners`, `pixel`, `width`: of the image: its pixel numbers in square tiles, and how
     many pixels a row has; `distance`: to the visible surfaces [m]; `tolerance`: largest second difference between
@@ -235,7 +235,7 @@ def _smooth(corners: Corners, distance: Metres, numbers: list[Any], masks: list[
 
 
 def _between(number, corners: Corners, own, x, y):
-    """Return what lies between the corners of tiles, bilinear in x and y, which go from 0 to 1 over a tile."""
+    """Return the values between the corners of tiles, bilinear in x and y, which go from 0 to 1 over a tile."""
     others = (dr.gather(mi.UInt32, tiles, own) for tiles in (corners.right, corners.below, corners.diagonal))
     base, across, down, diagonal = (dr.gather(type(number), number, tile) for tile in (own, *others))
     return dr.lerp(dr.lerp(base, across, x), dr.lerp(down, diagonal, x), y)

@@ -90,7 +90,7 @@ def _same_pixel(past: PastFrames, pixel: PerRay) -> tuple[PerRay, Any]:
 
 
 def _same_surface(past: PastFrames, camera: Camera, pixel: PerRay, distance: Metres) -> tuple[PerRay, Any]:
-    """Return what the last frame showed of the surface of each pixel, and whether it saw that."""
+    """Return the last frame's values on the surface of each pixel, and whether it saw the surface."""
     Color, Float, last = type(past.image), type(distance), past.camera
     _, aim = ray_directions(camera, pixel)
     there = dr.isfinite(distance)

@@ -114,7 +114,7 @@ def _next_of(
 
 
 def _started(renderer: FrameRenderer) -> Callable[[], Any]:
-    """Return what finishes the preparation.
+    """Return a function that finishes the preparation.
 
     One that works on the host has a method `start`: it reads what it needs of the scene, for which the device must have
     come to rest, and returns the rest of the work, which is done while the device is busy with the surface.

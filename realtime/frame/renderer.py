@@ -229,7 +229,7 @@ def _check_clouds(scene: Scene, method: Method) -> None:
 
 
 def _structure(lights: tuple[Light, ...]) -> tuple[tuple[bool, ...], ...]:
-    """Return what lights have: those that have the same share recorded functions."""
+    """Return the structure of lights: lights of one structure share recorded functions."""
     return tuple(tuple(value is None for value in vars(light).values()) for light in lights)
 
 
@@ -299,7 +299,7 @@ def _stages(renderer: FrameRenderer, scene: Scene, *, alone: bool) -> Stages:
 
 
 def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, alone: bool):
-    """Return what a frame makes of layers, by the formula of `realtime.methods.interface.method`.
+    """Return a frame from layers, by the formula of `realtime.methods.interface.method`.
 
     `layers`: of a method; `by_light`: the radiance of the surfaces by light where the layers have a visibility,
     otherwise their sum alone; `alone`: whether there is no other group of lights. Returns `airlight`, `surface`:
@@ -415,7 +415,7 @@ def _added(renderer: FrameRenderer, groups: Sequence[LightGroup], cast: Cast, by
 
 
 def _shaded(renderer: FrameRenderer, group: LightGroup, cast: Cast):
-    """Return what camera rays met in the light of a group."""
+    """Return the surfaces that camera rays met in the light of a group."""
     scene, stages = renderer.scene, group.stages
     geometry = scene.geometry if stages.shade_casts_rays else None
     return stages.shade(geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, group.lights, cast)

@@ -48,7 +48,7 @@ class SampledSphere:
 
 
 def sphere_scales(scene: Scene, method: Method) -> Frozen | None:
-    """Return what finds by what a sphere light's samples are scaled; None where the method or the medium has no use.
+    """Return a function for the scale of a sphere light's samples; None where the method or the medium has no use.
 
     Valid for methods that render samples one by one with a kernel in a homogeneous medium without bounds.
     """
@@ -98,7 +98,7 @@ def sampled_sphere(light: AreaLight, points: LightSamples, Float: Any) -> Sample
 
 
 def _places(view: View, sphere: SampledSphere):
-    """Return what gives the normal at a place of a number, and its fraction of the area times the places."""
+    """Return a function of the number of a place: its normal, and its fraction of the area times the places."""
     Float, pi = type(sphere.radius), dr.pi
     direction, radius = view.direction, sphere.radius
     way = sphere.centre - view.origin

@@ -218,7 +218,7 @@ def _nothing_met(geometry, facets, pixel, camera, medium, lights):
 
 
 def no_surface(geometry, facets, pixel, camera, medium, lights, cast):
-    """Return what `shade` returns where there are no surfaces: black, RGB [W/(m^2 sr)], for each light.
+    """Return the result of `shade` without surfaces: black, RGB [W/(m^2 sr)], for each light.
 
     The parameters are those of `shade`: `geometry`, `facets`, `pixel`, `camera`, `medium`, `lights`, `cast`.
     """

@@ -144,7 +144,7 @@ class CloudCollectors(Method):
         return self.carries
 
     def preparation(self, scene):
-        """Return what makes the light maps of a frame; grids and boundaries are made here, once.
+        """Return a function that makes the light maps of a frame; grids and boundaries are made here, once.
 
         Raises InputError if the maps need more memory than the machine has.
         """
@@ -243,7 +243,7 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
 
 
 def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling, ...], tuple[Any, ...]]:
-    """Return what clouds are filled with, each phase function and albedo once, and `CloudState.left`."""
+    """Return the fillings of clouds, each phase function and albedo once, and `CloudState.left`."""
     clouds = scene.medium.clouds
     assert clouds is not None
     types = types_of(type(scene.camera.origin.x))

@@ -90,7 +90,7 @@ class CloudOctaves(Method):
     )
 
     def preparation(self, scene):
-        """Return what makes the state of a frame."""
+        """Return a function that makes the state of a frame."""
         return _preparation(scene, self)
 
     def render(self, view, state, kernel):

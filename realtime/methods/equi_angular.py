@@ -59,7 +59,7 @@ class EquiAngular(Method):
     animate: str = animate()
 
     def preparation(self, scene):
-        """Return what makes tables of the lights."""
+        """Return a function that makes tables of the lights."""
         return lambda now: light_tables(now.lights)
 
     def render(self, view, state, kernel):

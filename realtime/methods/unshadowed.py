@@ -73,7 +73,7 @@ class Unshadowed(Method):
             )
 
     def preparation(self, scene):
-        """Return what finds the radiance of the sky, for a fog colour."""
+        """Return a function for the radiance of the sky, for a fog colour."""
         return super().preparation(scene) if self.form == "airlight" else lambda now: now.sky
 
     def render(self, view, state, kernel):

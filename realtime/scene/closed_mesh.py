@@ -36,7 +36,7 @@ class ClosedMesh:
         return self.vertices[self.faces]
 
     def edge_words(self, tail: int, head: int) -> str:
-        """Return what a message calls an edge: the user's numbers of its vertices, and its middle."""
+        """Return the name of an edge in messages: the user's numbers of its vertices, and its middle."""
         place = 0.5 * (self.vertices[tail] + self.vertices[head])
         return f"edge {self.own[tail]}-{self.own[head]} at ({', '.join(f'{x:.6g}' for x in place)})"
 

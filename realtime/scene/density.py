@@ -195,7 +195,7 @@ def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
 
 
 def density_at(values: NDArray[np.float32], fraction: Array) -> Array:
-    """Return what a grid (z, y, x) holds at places in the unit cube, (n, 3)."""
+    """Return the values of a grid (z, y, x) at places in the unit cube, (n, 3)."""
     counts = np.array(values.shape[::-1])
     place = np.clip(fraction * counts - 0.5, 0, counts - 1)
     cell = np.minimum(place.astype(np.int64), np.maximum(counts - 2, 0))

@@ -187,7 +187,7 @@ def _clouds(media: list[Homogeneous], boundaries, types: ArrayTypes) -> Clouds:
 
 
 def _phase_key(phase) -> tuple[Any, ...]:
-    """Return what two phase functions have in common if they are equal."""
+    """Return a key that equal phase functions share."""
     parameters = mi.traverse(phase)
     names = sorted(parameters.keys())
     return phase.class_name(), *(np.array(parameters[name], dtype=np.float64).tobytes() for name in names)

@@ -105,7 +105,7 @@ def read_scene(scene, precision: str = "single") -> Scene:
 
 
 def read_again(known: Scene, scene) -> Scene:
-    """Return what was read of a Mitsuba scene with camera, medium and lights as they are now; the shapes stay.
+    """Return a scene that was read before with the present camera, medium and lights; the shapes stay.
 
     Parameters
     ----------
@@ -343,7 +343,7 @@ def _axis_name(light: Light) -> str:
 
 
 def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
-    """Return what is seen behind a scene that lights in it light: an environment, or a sky that is no light of clouds.
+    """Return the backgrounds that a scene with lights shows: an environment, or a sky that is no light of clouds.
 
     A constant emitter beside directional lights alone lights clouds (`_read_sky`), if there may be any.
     """
@@ -354,7 +354,7 @@ def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
 
 
 def scene_notes(scene, *, clouds: bool = True) -> list[str]:
-    """Return what the user should know of the cameras and the lights of a Mitsuba scene, a line each."""
+    """Return notes on the cameras and the lights of a Mitsuba scene, a line each."""
     cameras = len(scene.sensors())
     notes = [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
     notes += [

@@ -88,7 +88,7 @@ def _longest(error: Callable[[float], float], left: float) -> float:
 
 
 def _error(integrand: Callable[[Array], Array], nodes: int) -> float:
-    """Return what a rule leaves at most of integrals from 0 to 1; the integrand is asked for a column of places."""
+    """Return the largest error of a rule for integrals from 0 to 1; the integrand takes a column of places."""
     few, many = (np.array(unit_nodes(count)).T for count in (nodes, _MANY))
     values = integrand(np.concatenate([few[0], many[0]])[:, None])
     return float(np.max(np.abs(few[1] @ values[:nodes] / (many[1] @ values[nodes:]) - 1)))

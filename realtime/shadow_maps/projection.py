@@ -61,7 +61,7 @@ class Projection:
         return a, b, dr.select((face & 1) == 0, c, -c)
 
     def homogeneous(self, face, vector, weight: int) -> tuple[Any, Any, Any, Any]:
-        """Return what is proportional to (u, v, s, 1) on a face.
+        """Return a multiple of (u, v, s, 1) on a face.
 
         `face`: number of the face; `vector`: of points, less the position of the light [m]; or directions; `weight`: 1
         for points, 0 for directions: their last homogeneous coordinate. Returns `a`, `b`, `s`, `c`: linear in (vector,

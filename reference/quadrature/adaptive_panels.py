@@ -146,7 +146,7 @@ class _Sum:
         return f * rate[:, :, None], depth
 
     def edge_error(self, edge: Array, rounding: Array) -> Array:
-        """Return what the uncertain places of edges of shadows and of kinks are worth: integrand times uncertainty."""
+        """Return the effect of uncertain places of shadow edges and kinks: integrand times uncertainty."""
         pieces, every = self.pieces, np.arange(len(self.width))
         ends = np.stack([self.start, self.start + self.width], axis=1)
         f = self.at(every, ends)[0][..., self.integrand.same] * self.integrand.factor[:, None]

@@ -52,7 +52,7 @@ class Field(Protocol):
 
 
 def field_of(reference: ReferenceScene) -> Field:
-    """Return what fills a scene."""
+    """Return the field of a scene."""
     if isinstance(reference.medium, HeightMedium):
         return HeightField(reference.medium)
     if isinstance(reference.medium, GridMedium):

@@ -91,7 +91,7 @@ def _of_places(medium: HeightMedium, rays: Rays, stretches: Stretches, terms: Te
 
 
 def _of_suns(medium: HeightMedium, rays: Rays, stretches: Stretches, edge: Array) -> tuple[Array, Array]:
-    """Return what lit stretches scatter of suns of irradiance 1, in closed form, and its error, (stretches,) [1]."""
+    """Return the light of lit stretches under suns of irradiance 1, in closed form, and its error, (stretches,) [1]."""
     ray, x0, x1 = stretches
     fog = fog_of(medium)
     origin, rise = float(rays.origin @ medium.up), rays.direction[ray] @ medium.up

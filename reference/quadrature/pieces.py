@@ -75,7 +75,7 @@ def whole(lit: Stretches) -> Pieces:
 
 
 def _parts(reference: ReferenceScene, rays: Rays, segments: Segments, ray: Index, x0: Array, x1: Array) -> Pieces:
-    """Return what parts of lit intervals lie in each medium, by ray and distance."""
+    """Return the parts of lit intervals in each medium, by ray and distance."""
     parts = []
     for start, end, medium in zip(segments.start, segments.end, segments.medium):
         low, high = np.maximum(x0, start[ray]), np.minimum(x1, end[ray])

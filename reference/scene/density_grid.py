@@ -122,7 +122,7 @@ def _box(medium: Any) -> tuple[Array, Array]:
 
 
 def _trilinear(values: Array, place: Array) -> Array:
-    """Return what a grid (z, y, x) holds at places in voxels, (n, 3)."""
+    """Return the values of a grid (z, y, x) at places in voxels, (n, 3)."""
     most = np.array(values.shape[::-1]) - 1
     place = np.clip(place, 0, most)
     cell = np.minimum(place.astype(np.int64), np.maximum(most - 1, 0))

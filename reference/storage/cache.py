@@ -146,7 +146,7 @@ def cache_entries() -> list[Entry]:
 
 
 def _listed(folder: Path) -> list[Path]:
-    """Return what a folder holds: nothing, once another process has removed it (`Path.glob` of Python 3.11 raises)."""
+    """Return the contents of a folder, none once another process removed it (`Path.glob` of Python 3.11 raises)."""
     try:
         return list(folder.iterdir())
     except OSError:

@@ -239,7 +239,7 @@ def add_spent(spent: Spent) -> None:
 
 
 def loaded_spent() -> Spent:
-    """Return what it once took to compute all that this process has loaded."""
+    """Return the original time of all results that this process has loaded."""
     return Spent(*_loaded)
 
 

@@ -33,7 +33,7 @@ class Obstacles:
 
 
 def obstacles(reference: ReferenceScene, light: Ball, distance: Array, shapes: Shapes | None = None) -> Obstacles:
-    """Return what can stand between a light and the rays of a scene.
+    """Return the possible occluders between a light and the rays of a scene.
 
     `reference`: the scene; `light`: what holds the light; `distance`: how far its rays go, (rays,), may be infinite
     [m]; `shapes`: what `reference.scene.shapes.read_shapes` returned for its occluders, if known.

@@ -211,7 +211,7 @@ def _triangle(lanes: _Lanes, corners: Any, number: Any) -> tuple[Any, Any]:
 
 
 def _segment(lanes: _Lanes, first: tuple, second: tuple, cut: Any) -> tuple[Any, Any]:
-    """Return what a segment of the plane hides of the ray."""
+    """Return the part of the ray that a segment of the plane hides."""
     (z0, y0), (z1, y1) = first, second
     swap = y0 > y1
     y0, y1, z0, z1 = (dr.select(swap, a, b) for a, b in ((y1, y0), (y0, y1), (z1, z0), (z0, z1)))
@@ -225,7 +225,7 @@ def _segment(lanes: _Lanes, first: tuple, second: tuple, cut: Any) -> tuple[Any,
 
 
 def _sphere(lanes: _Lanes, spheres: Any, number: Any) -> tuple[Any, Any]:
-    """Return what a sphere hides of the ray."""
+    """Return the part of the ray that a sphere hides."""
     parts = [dr.gather(mi.Float64, spheres, number * 4 + k) for k in range(4)]
     centre, radius = mi.Vector3d(*parts[:3]) - lanes.origin, parts[3]
     beside, c_y, c_z = dr.dot(centre, lanes.normal), dr.dot(centre, lanes.across), dr.dot(centre, lanes.direction)
@@ -249,7 +249,7 @@ def _sphere(lanes: _Lanes, spheres: Any, number: Any) -> tuple[Any, Any]:
 
 
 def _disk(lanes: _Lanes, disks: Any, number: Any) -> tuple[Any, Any]:
-    """Return what a flat disk hides of the ray: the segment in which the plane cuts it."""
+    """Return the part of the ray that a flat disk hides, by the segment in which the plane cuts it."""
     parts = [dr.gather(mi.Float64, disks, number * 7 + k) for k in range(7)]
     centre, n, radius = mi.Vector3d(*parts[:3]) - lanes.origin, mi.Vector3d(*parts[3:6]), parts[6]
     along = dr.cross(n, lanes.normal)

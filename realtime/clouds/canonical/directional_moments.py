@@ -198,7 +198,7 @@ class _Run:
         return slice(name * suns, (name + (2 if name == _A else 1)) * suns)
 
     def from_beam(self, mu: Array, m: int, order: int) -> Array:
-        """Return what the beam scatters to light of an order: its own peak has scattered it order - 1 times before."""
+        """Return the light of the beam in an order: the peak has scattered the beam order - 1 times before."""
         slab = self.slab
         if order > _BEAM_ORDERS or (order > 1 and abs(slab._peak) < _NO_PEAK):
             return np.zeros(1, slab._type)

@@ -41,7 +41,7 @@ def _folder() -> Path:
 
 
 def medium_numbers(phase: SlabPhase, albedo: float) -> Array:
-    """Return what tells a medium from others: moments of its phase function, and its albedo."""
+    """Return the key of a medium: moments of its phase function, and its albedo."""
     return np.append(phase.moments(_TOLD_APART), albedo)
 
 

@@ -105,7 +105,7 @@ def canonical_transport(phase: SlabPhase, albedo: float, *, progress: Progress |
 
 
 def logged(made: str) -> Progress:
-    """Return what writes a line into the log now and then: a frame waits for minutes, which looks like a hanging one.
+    """Return a function that logs progress now and then: a frame that waits for minutes looks like a hanging one.
 
     It is a warning, so that it reaches the error stream where nobody has set up a log.
     """
@@ -123,7 +123,7 @@ def logged(made: str) -> Progress:
 
 
 def transport_digest() -> str:
-    """Return what names the transport of whatever medium: how its numbers are made."""
+    """Return the key of the transport of any medium: how its numbers are made."""
     made = VERSION, SIDES, COMPUTED, FINER, coordinates.THINNEST, coordinates.THICKEST, coordinates.LOWEST_SUN
     return hashlib.blake2b(repr(made).encode(), digest_size=8).hexdigest()
 
@@ -285,7 +285,7 @@ class TransportGrid:
 
 
 def _between(kind: Any, table: Any, number: Any, places: Sequence[Any], sides: tuple[int, ...]) -> Any:
-    """Return what a table of a set has at a place, linear on the simplex of entries that holds it."""
+    """Return the value of a set's table at a place, linear on the simplex of entries that holds it."""
     total = kind(0)
     for index, weight in around(tuple(places), sides, number * math.prod(sides)):
         total = dr.fma(dr.gather(kind, table, index), weight, total)

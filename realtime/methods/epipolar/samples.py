@@ -116,7 +116,7 @@ def sample_ray(samples: Samples, sample):
 
 
 def no_value(like):
-    """Return what stands for the value of a sample whose ray meets no light, an array `like` the values."""
+    """Return the mark in place of a value for a sample whose ray meets no light, an array `like` the values."""
     return type(like)(_BESIDE)
 
 

@@ -164,7 +164,7 @@ def _least_square(grid: Grid, begin: Any, end: Any) -> Any:
 
 
 def _weight(view: View, light: Light, points: FroxelPoints, lit: Any) -> Any:
-    """Return what S is for a unit of intensity without its factor 1/(4 pi), in parts of the medium's `unit`."""
+    """Return S for unit intensity without its factor 1/(4 pi), in parts of the medium's `unit`."""
     medium, Float = view.medium, type(view.distance)
     toward = light.toward(points.point)
     square = dr.squared_norm(toward)

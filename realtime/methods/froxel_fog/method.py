@@ -85,7 +85,7 @@ class FroxelFog(Method):
             check_maps(scene.lights, self.map, froxels + maps + maps_memory(Float, samples, self.point_map))
 
     def preparation(self, scene):
-        """Return what makes tables of light samples and, if they are asked for, shadow maps."""
+        """Return a function that makes tables of light samples and, if asked for, shadow maps."""
         with_maps = self.shadow == "map" and scene.features.shadows
 
         def prepare(now):

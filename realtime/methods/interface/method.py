@@ -147,7 +147,7 @@ class View(Rays):
 def camera_view(
     camera: Camera, pixel: PerRay, distance: Metres, *, features: SceneFeatures, scene, medium: Medium, lights
 ) -> View:
-    """Return what a method is given for some pixels; `distance` [m] is that to the visible surface."""
+    """Return the view of some pixels; `distance`: to the visible surface [m]."""
     rays = medium.rays(camera.origin, *ray_directions(camera, pixel))
     own = {"features": features, "camera": camera, "pixel": pixel, "scene": scene}
     return View(**vars(rays), distance=distance, lights=tuple(lights), medium=medium, **own)
@@ -209,7 +209,7 @@ class Method(Parameters):
         """Refuse a scene, by `InputError`, that the method with these parameters cannot render."""
 
     def prepare(self, scene: Scene, light: Light) -> Any:
-        """Return what `airlight` needs of a scene and one light; it is asked only where something casts a shadow."""
+        """Return the state for `airlight` of a scene and one light; called only where something casts a shadow."""
 
     def airlight(self, view: View, light: Light, state: Any, kernel: Any) -> Any:
         """Return the radiance that one light has scattered into every ray [W/(m^2 sr)].
@@ -233,7 +233,7 @@ class Method(Parameters):
         raise NotImplementedError
 
     def preparation(self, scene: Scene) -> Preparation:
-        """Return what makes the state of all lights; what it needs of the scene once is read here."""
+        """Return a function that makes the state of all lights; constant data of the scene are read here."""
         if not scene.features.shadows:
             return no_state
         return lambda now: tuple(self.prepare(now, light) for light in now.lights)

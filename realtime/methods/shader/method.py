@@ -81,7 +81,7 @@ class Shader(Method):
         return run
 
     def render(self, view, state, kernel):
-        """Return what the shader draws; what is not finite is refused."""
+        """Return the image of the shader; values that are not finite are refused."""
         host, maps = state
         arrays: dict[str, Any] = ray_arrays(view, surfaces=bool({"g_normal", "g_albedo"} & self.shader.words))
         arrays["layers shadow_maps"] = map_array(maps)

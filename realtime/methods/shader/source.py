@@ -77,7 +77,7 @@ class ShaderSource:
     words: frozenset[str] = field(default=frozenset(), repr=False)  #: all names in its code
 
     def mistake(self, log: str) -> str:
-        """Return what the driver says of the text, by the file and line of the user, and the line itself."""
+        """Return the driver's message by the user's file and line, and the line itself."""
         for pattern in _ERRORS:
             found = pattern.search(log)
             if found:

@@ -206,7 +206,7 @@ class ShadowPlanes(Method):
         return self.ambient * view.medium.ambient(view, dr.minimum(view.distance, 1e30))
 
     def _buffered(self, view: View, state, kernel) -> Layers:
-        """Return what the buffer of 8 bits holds after all passes, less the lit surfaces."""
+        """Return the 8-bit buffer after all passes, less the lit surfaces."""
         buffer, Color = Buffer(self.white), type(view.medium.albedo)
         total, surfaces = Color(0), Color(0)  # what the buffer holds, and what of that are surfaces
         lit = []
@@ -299,7 +299,7 @@ def plane_finder(
     types: ArrayTypes,
     own: str | None = None,
 ) -> Callable[[], PlaneIndex]:
-    """Return what finds the shadow planes of one light, as a camera needs them; `cone` edges bound a spot.
+    """Return a function that finds the shadow planes of one light for a camera; `cone` edges bound a spot.
 
     The shape `own` is that of the light, which casts no shadow in it.
 

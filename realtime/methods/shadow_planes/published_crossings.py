@@ -35,7 +35,7 @@ class Buffer:
     white: float  #: radiance that fills it [W/(m^2 sr)]
 
     def stored(self, value):
-        """Return what the buffer keeps of a radiance `value` [W/(m^2 sr)]."""
+        """Return a radiance `value` as the buffer keeps it [W/(m^2 sr)]."""
         return dr.round(dr.clip(value, 0, self.white) * (255 / self.white)) * (self.white / 255)
 
 
@@ -128,7 +128,7 @@ def reaches(index: PlaneIndex, ray: RayPlanes, distance):
 
 
 def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
-    """Return what is larger of the planes that count: -cos in the paper's order, else a limit of D/x that is not."""
+    """Return the key of an entry: planes with a larger one count. It is -cos in the paper's order, else D/x."""
     if order != "paper":
         return index.distance / entry.distance
     # The entry is x w from the camera, which is at D on the z axis.

@@ -150,7 +150,7 @@ class _Passed:
 
 
 def _start(sweep: _Sweep) -> _Passed:
-    """Return what every ray has passed at the camera."""
+    """Return the state of every ray at the camera."""
     Float, width = type(sweep.ray_end), dr.width(sweep.ray.x)
     camera = dr.full(Float, dr.inf, width)
     return _Passed(dr.zeros(Float, width) + sweep.index.layers, camera, +camera, no_intervals(sweep.zero, +camera))

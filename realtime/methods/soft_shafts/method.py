@@ -101,7 +101,7 @@ class SoftShafts(SoftShaftsParameters):
         return self.shadow == "map" or self.surfaces == "map" or self.hd == AUTO
 
     def preparation(self, scene):
-        """Return what makes the tables of light samples of a frame, and their maps: a record for each source."""
+        """Return a function for the tables of light samples of a frame, and their maps: a record for each source."""
         asked = {
             "with_maps": self._with_maps and scene.features.shadows,
             "for_surfaces": self.surfaces == "map",
@@ -252,7 +252,7 @@ class _Frame:
         return separable(lit, self.raster, hd=hd, guides=(self.depth,), support=2.0, most=_MOST_AUTO)
 
     def _lit(self, number: int, light: int, place: int) -> Callable[[Any], Any]:
-        """Return what says whether a light reaches points of the few rays."""
+        """Return a test of whether a light reaches points of the few rays."""
         view, p = self.few, self.parameters
         if not view.features.shadows or p.shadow == "none":
             return lambda point: True

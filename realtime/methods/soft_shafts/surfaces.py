@@ -60,7 +60,7 @@ def reached_surfaces(
     p: SoftShaftsParameters,
     asked: Any = True,
 ) -> Reached:
-    """Return what of an area light reaches the surfaces of a view, where they are `asked` for; others return 0.
+    """Return the part of an area light that reaches `asked` surfaces of a view; others return 0.
 
     `view`: the rays, row by row; `state`: the light; `number_of`, `count`: which light sample each ray asks first,
     second and so on, counted from 0, and how many; `p`: the parameters.
@@ -85,7 +85,7 @@ def reached_surfaces(
 
 
 def _of_point(view: View, state: SourceState, place: Any, there: Any, number: Any, p: SoftShaftsParameters) -> Any:
-    """Return what one light sample adds to each sum of `Reached`."""
+    """Return the terms of one light sample in the sums of `Reached`."""
     Float = type(view.distance)
     frame = frame_at(state.frames, number)
     a, b, c = frame.local(place - frame.position)

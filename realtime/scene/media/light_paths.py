@@ -337,7 +337,7 @@ class LightPaths:
         return (offset - dr.dot(normal, self.start)) * scale, -dr.dot(normal, self.direction) * scale, facing > 0
 
     def _over_planes(self, state, step: Callable[..., Any], active):
-        """Return what becomes of a state by step(number, line, state) over the planes."""
+        """Return a state after step(number, line, state) over the planes."""
         _, state = dr.while_loop(
             state=(mi.UInt32(0), state),
             cond=lambda number, state: active & (number < self.bounded.count),
@@ -350,7 +350,7 @@ class LightPaths:
         return state
 
     def _over_neighbours(self, plane, state, step: Callable[..., Any]):
-        """Return what becomes of a state over the planes that share an edge with one."""
+        """Return a state after the planes that share an edge with one."""
         sides = self.bounded.sides
 
         def at(side, state):

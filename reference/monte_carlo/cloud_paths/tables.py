@@ -122,7 +122,7 @@ def _numbers(values) -> tuple[float, float, float]:
 
 
 def walk_scene(clouds: CloudScene, channel: int) -> WalkScene:
-    """Return what the walk reads, with the extinctions of one channel."""
+    """Return the scene for the walk, with the extinctions of one channel."""
     numbers = {
         int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(each.shape))[0]): n for n, each in enumerate(clouds.clouds, 1)
     }

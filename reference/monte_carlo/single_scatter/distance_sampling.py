@@ -205,12 +205,12 @@ def mixture_of(span: Span, sigma_t: Sequence[Any]) -> Mixture:
 
 
 def mixture_pdfs(y, mixture: Mixture) -> tuple[Any, Any]:
-    """Return what either technique adds to the density of the mixture at y [1/m]; their shares are the MIS weights."""
+    """Return the terms of either technique in the mixture density at y [1/m]; their fractions are the MIS weights."""
     return tuple(pdf for _, pdf in _terms(y, mixture))
 
 
 def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
-    """Return what equi-angular sampling and free flights add to the distribution function and to the density."""
+    """Return the terms of equi-angular sampling and free flights in the distribution function and the density."""
     h, s = mixture.span.height, mixture.span.start + y
     flights = [_flight_cdf_and_pdf(y, flight) for flight in mixture.flights]
     fraction = 0.5 / len(flights)

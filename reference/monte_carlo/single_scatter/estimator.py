@@ -54,7 +54,7 @@ def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
 
 
 def _next_hit(task: Task, ray: Ray, done, active):
-    """Return what rays meet from some distance on."""
+    """Return the hits of rays from some distance on."""
     if not task.around.surfaces:
         return dr.zeros(mi.SurfaceInteraction3f, dr.width(active))
     return task.around.scene.ray_intersect(mi.Ray3f(ray.origin + ray.direction * done, ray.direction), active)
@@ -131,7 +131,7 @@ def _airlight(task: Task, sampler, ray: Ray, part: Part, active) -> tuple[Any, A
 
 
 def _surface(task: Task, sampler, ray: Ray, hit, x, part: Part, active) -> tuple[Any, Any]:
-    """Return what all lights send by way of the surface at the end of a part of the rays, x [m] from the camera."""
+    """Return the light that the surface at the end of a part of the rays, x [m] from the camera, reflects."""
     total = dr.zeros(mi.Spectrum, dr.width(active))
     if not task.around.surfaces:
         return total, sampler

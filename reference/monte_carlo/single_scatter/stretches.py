@@ -69,7 +69,7 @@ class Part(ABC):
 
     @abstractmethod
     def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
-        """Return what is left of light that comes to points by paths, and to the camera from there, x [m] away.
+        """Return the transmittance of paths to points, and from there to the camera, x [m] away.
 
         Nothing is where something stands in a path. Returns the sampler, too.
         """
