@@ -16,7 +16,7 @@ Reader = Callable[[str, Any], Any]
 
 
 def read_toml(what: str, path: Path) -> dict[str, Any]:
-    """Return what a TOML file holds."""
+    """Return the contents of a TOML file."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

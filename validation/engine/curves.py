@@ -22,7 +22,7 @@ def from_srgb(encoded: Array) -> Array:
 
 
 def srgb_in_8_bits(radiance: Array) -> Array:
-    """Return what is left of values that were written in 8 bits by that curve, as numbers from 0 to 1."""
+    """Return values after 8-bit encoding by that curve, as numbers from 0 to 1."""
     return np.round(255 * np.clip(to_srgb(radiance), 0.0, 1.0)) / 255
 
 

@@ -225,7 +225,7 @@ class _Attempt:
         return is_explained(explanation, self.right, self.predictor.pairs, self.little)
 
     def rest(self, explanation: Explanation) -> str:
-        """Return what an explanation leaves, in words; nothing where something else is wrong too."""
+        """Return the residual of an explanation in words; nothing where something else is wrong too."""
         if is_explained(explanation, self.right, self.predictor.pairs, 0.0):
             return "noise: neighbouring pixels do not share it"
         if self.explained(explanation):

@@ -66,7 +66,7 @@ class Fault:
     kind: str = ""  #: of the table that it is in: one of `validation.engine.faults.KINDS`
 
     def sentence(self, values: Values) -> str:
-        """Return what is said of an image with it."""
+        """Return the words for an image with the fault."""
         return self.words.format(*values) + (factor_name(values[0]) if self.factor else "")
 
 
@@ -95,7 +95,7 @@ def with_scenery(**given: Any) -> Change:
 
 
 def scenery_number(name: str, digits: int = 4) -> Change:
-    """Return what sets a number of the scenery, with few digits: sceneries that differ by less share their paths."""
+    """Return a change of a number of the scenery, with few digits: sceneries that differ by less share their paths."""
     return lambda predictor, guess, p: with_scenery(**{name: short(p[0], digits)})(predictor, guess, p)
 
 
@@ -130,7 +130,7 @@ def changed_values(change: Callable[..., Array]) -> Change:
 
 
 def undone(undo: Callable[[Array], Array]) -> Change:
-    """Return what is said of the grid of pixels by what takes it back."""
+    """Return the change by a fault of the grid of pixels, given the inverse of the fault."""
     return lambda predictor, guess, p: replace(guess, undo=undo)
 
 

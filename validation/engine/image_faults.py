@@ -111,7 +111,7 @@ def _clamp(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 
 def _darkest(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-    """Return what the darker half of the image has more than the guess."""
+    """Return the excess of the darker half of the image over the guess."""
     predicted, shown = predictor.predicted(guess), predictor.shown(guess)
     more = (shown - predicted)[predicted <= np.median(predicted)]
     return [(max(float(np.median(more)), 1e-6 * float(np.abs(shown).mean()), 1e-30),)]

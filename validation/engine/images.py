@@ -89,7 +89,7 @@ def measure_image(
 
 
 def notes_of(judged: EngineComparison, times: tuple[Timing, str] | None) -> str:
-    """Return what the reader of a file changed or left out, what a pixel is, whether it is right, and the device."""
+    """Return notes of the reader of a file, the kind of its pixels, whether it is right, and the device."""
     notes = [judged.note] if judged.note else []
     notes += ["judged by the means over the areas of pixels, which fit"] if judged.pixel == "area" else []
     notes += [judged.verdict.words]

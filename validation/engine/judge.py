@@ -334,7 +334,7 @@ def _mean_square(values: NDArray[np.floating]) -> float:
 
 
 def fitting_kind(judged: JudgedLayer, reference_of: ReferenceOf, kinds: Sequence[str]) -> tuple[PixelKind, Hints]:
-    """Return what the pixels of an image are, by the reference that fits it, and what is suspected of it as a whole.
+    """Return the kind of an image's pixels, by the reference that fits it, and the suspected faults of the whole image.
 
     `reference_of`: computes a reference; asked for the means only if the image does not fit the centres to `_EXACT`;
     `kinds`: what its pixels may be, see `validation.engine.seen.pixel_kinds`.

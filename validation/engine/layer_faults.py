@@ -24,7 +24,7 @@ from validation.engine.prediction import Guess, Layers, Predictor
 
 
 def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
-    """Return what gives some lights, or all, a factor in a tuple of the fog."""
+    """Return a function that gives some lights, or all, a factor in a tuple of the fog."""
 
     def changed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
         old = getattr(guess.fog, entry)
@@ -36,7 +36,7 @@ def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:
 
 
 def _times(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]]:
-    """Return what begins a factor: the one with which its part of the light explains most of what the rest leaves."""
+    """Return the start of a factor: its part of the light then explains most of the residual of the rest."""
 
     def begin(predictor: Predictor, guess: Guess) -> Sequence[Values]:
         once, none = (predictor.predicted(change(predictor, guess, (value,))) for value in (1.0, 0.0))
@@ -62,7 +62,7 @@ def factor_fault(name: str, words: str, change: Change, needs: tuple[str, ...] =
 
 
 def _opacity(change: Callable[[Array, Array, Array], tuple[Array, Array]]) -> Change:
-    """Return what is done to airlight and surfaces with the transmittance of the fog."""
+    """Return the change of airlight and surfaces by the transmittance of the fog."""
 
     def make(predictor: Predictor, guess: Guess, p: Values) -> Layers:
         left = predictor.transmittance(guess)

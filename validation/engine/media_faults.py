@@ -31,7 +31,7 @@ _USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)  # of cameras in engines and
 
 
 def _optics(change: Callable[..., tuple[float, float]]) -> Change:
-    """Return what gives extinction and albedo of every channel of every medium."""
+    """Return a function that sets extinction and albedo of every channel of every medium."""
     return changed_fog(lambda fog, *p: changed_optics(fog, lambda s, a: change(s, a, *p)))
 
 
@@ -53,7 +53,7 @@ def _absorption(sigma_t: float, albedo: float, factor: float = 0.0) -> tuple[flo
 
 
 def _lobes(choose: Callable[[float], float | PhaseLaw]) -> Change:
-    """Return what changes every phase function of Henyey and Greenstein by its g."""
+    """Return a function that changes every Henyey-Greenstein phase function by its g."""
     return changed_fog(
         lambda fog: replace(fog, phase=tuple(choose(g) if isinstance(g, float) else g for g in fog.phase))
     )
@@ -80,7 +80,7 @@ def _every_phase(law: float | PhaseLaw) -> Change:
 
 
 def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-    """Return what lengths times a factor make of it: paths grow with it, and light from points falls as its square.
+    """Return the guess with all lengths times a factor: paths grow with it, and light from points falls as its square.
 
     Irradiance and radiance, of lights that are far or have extent, are what they were.
     """
@@ -91,7 +91,7 @@ def _unit(predictor: Predictor, guess: Guess, p: Values) -> Guess:
 
 
 def _between(spherical: bool, end: str, at: float | None = None) -> Change:
-    """Return what lets the medium begin or end at a distance, one that is given or a number of the fault."""
+    """Return a function that begins or ends the medium at a distance, a given one or a parameter of the fault."""
     return changed_fog(lambda fog, *p: replace(fog, **{end: short(p[0]) if at is None else at, "spherical": spherical}))
 
 
@@ -129,7 +129,7 @@ def _densities(predictor: Predictor, guess: Guess) -> Sequence[Values]:
 
 
 def _layers(change: Callable[..., Layer]) -> Change:
-    """Return what changes every layer of height fog."""
+    """Return a function that changes every layer of height fog."""
 
     def changed(fog: Fog, *p: float) -> Fog:
         assert fog.height is not None
@@ -140,7 +140,7 @@ def _layers(change: Callable[..., Layer]) -> Change:
 
 
 def _stretched(factor: Callable[..., float]) -> Change:
-    """Return what gives every layer another scale height."""
+    """Return a function that gives every layer another scale height."""
     return _layers(lambda layer, *p: replace(layer, scale_height=factor(layer.scale_height, *p)))
 
 

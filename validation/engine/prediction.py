@@ -128,7 +128,7 @@ class SceneLight:
         return self._once(key, lambda: scenery.model(seen, view, layer, ends), lambda model: 20 * model.places)
 
     def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
-        """Return what a fog makes of a layer of the pixels, (m, 3) [W/(m^2 sr)]."""
+        """Return a layer of the pixels for a fog, (m, 3) [W/(m^2 sr)]."""
         plain = fog.without_factors
         ends = fog.ends if layer == 0 else None
         key = "radiance", scenery, plain, layer, _sight(seen)
@@ -149,7 +149,7 @@ class SceneLight:
 
 
 def _sight(seen: Seen) -> tuple[Any, ...]:
-    """Return what of an image its pixels depend on, and their paths."""
+    """Return the key of the paths of an image: all that its pixels depend on."""
     return seen.area, seen.holds, seen.samples, seen.rays, seen.used.tobytes(), seen.cut_off.tobytes()
 
 

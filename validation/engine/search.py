@@ -107,7 +107,7 @@ def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[V
 
 
 def guess_of(predictor: Predictor, faults: Sequence[Fault], values: Values) -> Guess:
-    """Return what some faults with these values make of the scene."""
+    """Return the guess for some faults with these values."""
     guess = Guess(predictor.fog)
     for fault, part in zip(faults, _parted(faults, values), strict=True):
         guess = fault.change(predictor, guess, part)

@@ -156,7 +156,7 @@ def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> t
 
 
 def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
-    """Return what the pixels of an image may be: what was said, what an image of ours says, or both."""
+    """Return the possible kinds of an image's pixels: as given, as an image of ours says, or both."""
     if pixel is not None and pixel not in PIXELS:
         raise InputError(f"pixel: got {pixel}, wanted 'centre' or 'area'")
     said = pixel or image.attributes.get("airlight:pixel")
@@ -191,7 +191,7 @@ def decide_pixel(
     errors: Callable[[Sequence[Found]], Sequence[float]],
     exact: Callable[[Found], bool] = lambda found: False,
 ) -> tuple[PixelKind, Found]:
-    """Return what the pixels of an image are, and the attempt at it that takes them for that.
+    """Return the kind of an image's pixels, and the attempt for this kind.
 
     `kinds`: what they may be, see `pixel_kinds`; `errors`: what is left by attempts, which are compared where there are
     several; `exact`: whether one leaves so little that no other can leave less.

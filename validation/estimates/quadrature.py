@@ -94,7 +94,7 @@ def _checked_image(
 
 
 def _parts(key: str) -> Keep:
-    """Return what keeps parts of a reference until it is done: a run that was interrupted goes on from them."""
+    """Return a store for parts of a reference until it is done: a run that was interrupted goes on from them."""
 
     def keep(name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
         found, spent = load(f"{key}/{name}"), stopwatch()

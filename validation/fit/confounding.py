@@ -101,7 +101,7 @@ class Confounded:
 def confounded(
     group: Group, unknowns: Sequence[Unknown], inner: Mapping[int, float], lengths: Mapping[int, Array], holds: str
 ) -> Confounded:
-    """Return what an image says of a group, from the numbers on the whole line and the ends of their intervals."""
+    """Return the products that an image tells of a group, from the numbers on the whole line and their intervals."""
     names = {number: unknowns[number].name for number in group.members}
     products: dict[str, tuple[float, float, float | None]] = {}
     for kept, powers in group.powers.items():

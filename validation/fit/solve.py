@@ -107,7 +107,7 @@ class ImageModel:
         return np.stack(slopes, axis=2)
 
     def relative(self) -> Array:
-        """Return what counts as a relative error of 1, (m, 3)."""
+        """Return the unit of relative errors, (m, 3)."""
         size = np.abs(self.image)
         return np.maximum(size, _DIM * max(float(size.mean()), 1e-300))
 

@@ -163,7 +163,7 @@ class FogModel:
         return np.stack([np.bincount(view.ray_pixel, np.exp(-column)) / count for column in depth.T], axis=1)
 
     def _sums(self, places: Places, fog: Fog, number: int) -> Array:
-        """Return what the places send to each pixel, of a light of intensity 1, (m, 3)."""
+        """Return the light from the places to each pixel, for intensity 1, (m, 3)."""
         view = self.view
         layer = int(places.is_surface)
         direction, pixel = view.reference.direction[places.ray], view.ray_pixel[places.ray]

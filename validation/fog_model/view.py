@@ -83,7 +83,7 @@ class View:
         return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
 
     def _ball(self, light: ReferenceLight, area: ReferenceAreaLight | None) -> Ball:
-        """Return what holds a light, and others that are asked for: shapes near rays are looked for once for all.
+        """Return the bounds of a light and of others that are asked for: shapes near rays are searched once for all.
 
         This takes a millisecond a ray, which the places of a light that moves are worth where rays are few.
         """
@@ -129,7 +129,7 @@ class View:
 
 
 def _place_of(light: Light) -> tuple[Any, ...]:
-    """Return what decides which parts of rays a light reaches."""
+    """Return the properties that decide which parts of rays a light reaches."""
     if isinstance(light, DirectionalLight):
         return light.direction.tobytes(), None
     return light.position.tobytes(), "near", None if light.axis is None else light.axis.tobytes(), light.cutoff
@@ -289,7 +289,7 @@ def _edged(places: Places, light: Light, source: Source, blend: float) -> Places
 
 
 def _level(places: Places, light: ReferenceLight, sphere: Source, centre: Array) -> Array:
-    """Return what the samples of a sphere together send to places, as a multiple of what the sphere sends there, (n,).
+    """Return the light of all samples of a sphere at places, as a multiple of the sphere's light there, (n,).
 
     At the distance r from its centre a sphere of the radius R and the radiance L has the solid angle
     2 pi (1 - sqrt(1 - (R/r)^2)), and an area that faces it the irradiance pi L (R/r)^2. N samples with the normals n_i

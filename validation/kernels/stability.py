@@ -72,7 +72,7 @@ def claims_exact(name: str) -> bool:
 
 
 def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
-    """Return what a kernel that claims to be exact does not keep, in words."""
+    """Return the limits that a kernel that claims to be exact exceeds, in words."""
     sharp, smooth = np.abs(cases.g) > 0.9, np.asarray(cases.phase) != "tabulated"
     rows: dict[str, Bools] = {
         "all": np.ones(len(sharp), dtype=bool),

@@ -53,7 +53,7 @@ class FramesRecord:
         return self.exposure[frame] if isinstance(self.exposure, tuple) else self.exposure
 
     def shown(self, frame: int) -> tuple[dict[str, Any], dict[str, Any], tuple[float, ...]]:
-        """Return what a frame shows: changes and matrices of shapes that move by name, and the jitter of its pixels."""
+        """Return the state of a frame: changes and matrices of moving shapes by name, and the jitter of its pixels."""
         changes, moves = (
             {name: values[frame] for name, values in each.items()} for each in (self.changes, self.objects)
         )

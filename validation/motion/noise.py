@@ -137,7 +137,7 @@ class Noise:
 
 
 def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None = None) -> Noise:
-    """Return what renders of a frame are like.
+    """Return the noise of renders of a frame.
 
     `reference`: (height, width, channels), finite; `runs`: independent renders of that shape, at least two, finite;
     `seconds`: what one takes. Raises InputError for fewer, a dark reference, and runs that are the same.

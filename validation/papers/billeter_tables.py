@@ -143,7 +143,7 @@ def frame_within(renderer: FrameRenderer) -> Frame:
 
 
 def attempted(names: tuple[str, ...], work: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return what a piece of work gives; what it does not give, by `names`, is why it could not."""
+    """Return the results of a piece of work; where it failed, the reason under each of `names`."""
     try:
         return work()
     except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:

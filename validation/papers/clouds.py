@@ -170,7 +170,7 @@ def _searched_from(scene: Scene, aside: float) -> list[tuple[Array, Array, Array
 
 
 def _each(carried: Any, change: Callable[[Collector], Collector]) -> Any:
-    """Return what is carried from frame to frame with every collector changed."""
+    """Return the state that frames hand on, with every collector changed."""
     if isinstance(carried, tuple):
         return tuple(_each(part, change) for part in carried)
     return change(carried)

@@ -45,7 +45,7 @@ COMPARED: Mapping[str, Kernel] = MappingProxyType(
 
 
 def formulas() -> dict[str, float]:
-    """Return what printed formulas are over what they must be, and what light does in the paper's cloud."""
+    """Return printed formulas over their correct values, and facts on light in the paper's cloud."""
     return {"biri angle": _angular_form()} | _annex() | _within_ten_percent() | _cloud_equations() | _droplets()
 
 
@@ -129,7 +129,7 @@ def _cloud_equations() -> dict[str, float]:
 
 
 def _droplets() -> dict[str, float]:
-    """Return what Mie's theory has for the paper's droplets at 0.55 um: fractions [%], mean free path [m], g [1]."""
+    """Return results of Mie's theory for the paper's droplets at 0.55 um: fractions [%], mean free path [m], g [1]."""
     green = optics()
     return {
         "g": green.g,

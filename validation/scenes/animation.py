@@ -41,7 +41,7 @@ from validation.scenes.registry import MOVES, Animation
 
 
 def parse_moves(text: str) -> tuple[str, ...]:
-    """Return what moves, from words separated by commas such as 'light,colour'."""
+    """Return the parts that move, from words separated by commas such as 'light,colour'."""
     moves = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     for move in moves:
         if move not in MOVES:
@@ -50,7 +50,7 @@ def parse_moves(text: str) -> tuple[str, ...]:
 
 
 def moved_parts(animation: Animation) -> dict[str, bool]:
-    """Return what differs between a frame and the last, as keywords of `realtime.frame.incremental.next_frame`."""
+    """Return the differences between a frame and the last, as keywords of `realtime.frame.incremental.next_frame`."""
     return {
         "camera_moved": False,
         "geometry_moved": "objects" in animation.moves,
@@ -72,7 +72,7 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
 
 
 def frame_changes(moved: Scene, animation: Animation) -> dict[str, tuple[float, ...]] | None:
-    """Return what a frame changes in its scene, by the names of `validation.scenes.changes`.
+    """Return the changes of a frame in its scene, by the names of `validation.scenes.changes`.
 
     None where these names cannot say it: area lights, media that are not the same everywhere.
     """

@@ -50,7 +50,7 @@ class Changeable:
 
 
 def changeable(scene) -> dict[str, Changeable]:
-    """Return what can be changed in a Mitsuba scene, by name, with its values."""
+    """Return the changeable parameters of a Mitsuba scene, by name, with their values."""
     found = list(_of_camera(scene.sensors()[0])) if scene.sensors() else []
     for number, emitter in enumerate(scene.emitters(), 1):
         found += _of_light(_numbered("light", number), emitter)

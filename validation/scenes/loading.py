@@ -88,14 +88,14 @@ def find_record(name: str) -> SceneRecord | None:
 
 
 def scene_stem(name_or_path: str) -> str:
-    """Return what files of a scene are called: its name, the stem of its path, or 'random-7'."""
+    """Return the stem of the names of a scene's files: its name, the stem of its path, or 'random-7'."""
     if is_random(name_or_path):
         return f"{PREFIX[:-1]}-{random_parts(name_or_path)[0]}"
     return Path(name_or_path).stem
 
 
 def scene_identity(scene: str) -> str:
-    """Return what a scene is: a name or seed with a digest of what it is made from, the digest of a file's scene."""
+    """Return the identity of a scene: a name or seed with a digest of its description, the digest of a file's scene."""
     if scene in SCENES:
         return f"{scene} {SCENES[scene].digest}"
     if is_random(scene):

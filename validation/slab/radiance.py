@@ -67,7 +67,7 @@ def slab_radiance(
 def _diffuse_source(
     panels: DepthPanels, rule: Streams, mu0: float, *, kept: Array, albedo: float, mu: Array, phi: Array
 ) -> Array:
-    """Return what light of order 1 and above scatters into the directions, (Z, directions)."""
+    """Return the light that order 1 and above scatter into the directions, (Z, directions)."""
     tau = float(panels.edges[-1])
     total = np.zeros((panels.depths.size, mu.size))
     quiet = 0

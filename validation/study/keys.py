@@ -43,7 +43,7 @@ class Made:
 
 
 def made_here(airlight: str, variant: str) -> Made:
-    """Return what computes rows in this process; `airlight` is its version, `variant` the current one."""
+    """Return the software that computes rows in this process; `airlight`: its version, `variant` the current one."""
     packages = tuple((name, version(name)) for name in _PACKAGES)
     return Made(airlight, row_source(), packages, variant, platform.python_version())
 

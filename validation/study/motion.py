@@ -58,7 +58,7 @@ def method_motion(
     runs: int = 4,
     progress: Progress | None = None,
 ) -> list[MethodMotion]:
-    """Return what each configuration is like.
+    """Return the quality of each configuration.
 
     `scene`: the `mi.Scene`, at its own size; `animation`: that of the scene, of which the lights move; `turn`: frames
     of a whole turn of a sweep; `runs`: of a method that draws random numbers. Raises InputError for a scene whose

@@ -43,7 +43,7 @@ def method_noise(
     runs: int = 16,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> list[MethodNoise]:
-    """Return what the airlight of each configuration is like.
+    """Return the noise of each configuration's airlight.
 
     `scene`: the `mi.Scene`, at its own size; `runs`: of a method that draws random numbers, at least two. The time of a
     frame is a median while nothing moves. Raises InputError for fewer runs and a dark reference.

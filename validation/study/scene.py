@@ -144,7 +144,7 @@ class SceneStudy:
         return parts
 
     def given(self, chosen: Configuration) -> tuple[Cell, list[str], Mapping[str, str]]:
-        """Return what decides the row and the image of a configuration."""
+        """Return the inputs that decide the row and the image of a configuration."""
         return replace(self.cell(chosen), scene=self.identity), user_code(chosen), self.machine
 
 

@@ -69,7 +69,7 @@ def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
 
 
 def _kinks(phase: Any) -> float:
-    """Return what the kinks of a phase function are worth, relative to the integral."""
+    """Return the largest error by the kinks of a phase function, relative to the integral."""
     if not isinstance(phase, Tabulated):
         return 0.0
     values = np.array(phase.values, dtype=np.float64)
@@ -80,10 +80,9 @@ def _kinks(phase: Any) -> float:
 
 
 def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
-    """Return what the uncertain ends of lit intervals are worth in an `mi.Scene`, (pixels, 3) [W/(m^2 sr)].
+    """Return the largest error by uncertain ends of lit intervals in an `mi.Scene`, (pixels, 3) [W/(m^2 sr)].
 
-    Valid for lights without extent. Wherever a ray may end: the largest x s(x) along it, whether it is lit there or
-    not.
+    Valid for lights without extent. The ends may be anywhere: the largest x s(x) along a ray counts, lit or not.
     """
     whole = read_reference(scene)
     parts = np.array_split(pixels, range(_RAYS, len(pixels), _RAYS))
@@ -91,7 +90,7 @@ def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
 
 
 def _worth_of_ends(reference: ReferenceScene) -> Array:
-    """Return what the uncertain ends of the lit intervals of all rays of `reference` are worth, (rays, 3)."""
+    """Return the largest error by uncertain ends of lit intervals of all rays of `reference`, (rays, 3)."""
     distance = surface_hits(reference).distance
     worth = np.zeros((len(distance), 3))
     sources: list[tuple[Any, ...]] = [(light, _angles_about, _from_place) for light in reference.lights]
@@ -168,7 +167,7 @@ def _scattered(
     x: Array,
     distance: Array,
 ) -> Array:
-    """Return what a metre of rays scatters at distances x in the full light of one light, (n, 3) [W/(m^3 sr)]."""
+    """Return the light that a metre of rays scatters at distances x, fully lit by one light, (n, 3) [W/(m^3 sr)]."""
     direction = reference.direction[ray]
     segment, arriving = incident(reference.origin + x[:, None] * direction)
     from_camera = optical_depth(reference, reference.origin, direction, np.zeros(len(x)), x)

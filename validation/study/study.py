@@ -223,7 +223,7 @@ class Study:
 
 
 def default_configurations() -> tuple[Configuration, ...]:
-    """Return what a study without methods measures: the kinds of the quick report, area lights as by default."""
+    """Return the configurations of a study without methods: the kinds of the quick report, default area lights."""
     kinds = [each for each in QUICK if "points" not in dict(each.parameters)]
     known = {each.method for each in kinds}
     others = [name for name in FOG_METHODS if name not in known]

@@ -67,7 +67,7 @@ def random_record(name: str) -> SceneRecord:
 
 
 def drawn_values(name: str) -> dict[str, Any]:
-    """Return what was drawn for a random scene, as plain data without meshes; lengths are in metres."""
+    """Return the drawn values of a random scene, as plain data without meshes; lengths are in metres."""
     return _plain(asdict(_lit(*_parse(name))[0]))
 
 
