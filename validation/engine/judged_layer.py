@@ -54,7 +54,7 @@ def judged_layer(
 
 
 def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> Array:
-    """Return what a layer should be, (height, width, 3) [W/(m^2 sr)]."""
+    """Return the correct values of a layer, (height, width, 3) [W/(m^2 sr)]."""
     return reference_layer(reference, judged.holds, emitted=judged.emitted)
 
 

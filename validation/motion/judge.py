@@ -321,7 +321,7 @@ def _shifts(sequence: Sequence) -> dict[int, float]:
 
 
 def motion_verdict(measures: Measures, reference_error: float = 0.0) -> tuple[str, str]:
-    """Return what measures of a sequence say of it, see the module: the kind, and words."""
+    """Return the verdict on a sequence from its measures, see the module: the kind, and words."""
     rmse = measures.relative_rmse.value or 0.0
     if rmse <= max(_ROUNDING, 3 * reference_error):
         return "exact", f"exact: relative RMSE {rmse:.2g}"
