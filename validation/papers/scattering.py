@@ -44,7 +44,7 @@ _RADIUS = 0.97  # [m]
 
 
 def multiple_scattering() -> dict[str, Any]:
-    """Return the multiple scattering that a constant misses, the worst of three scenes, and its fraction in thin fog."""
+    """Return the multiple scattering that a constant misses, worst of three scenes, and its fraction in thin fog."""
     described = SCENES["open-fog"].build()
     described["fog"]["scale"] = _THIN
     scene = mi.load_dict(described)

@@ -107,7 +107,7 @@ def test_negative_and_missing_values_break_the_claim(variant):
 
 @pytest.mark.claim("differences-of-gamma")
 def test_differences_of_gamma_lose_what_theory_says(variant):
-    """Light volumes add up Gamma(x) = J(0, x). Of a sliver far from camera and light two nearly equal Gammas remain.
+    """Light volumes add up Gamma(x) = J(0, x). For a sliver far from camera and light two nearly equal Gammas remain.
 
     Each is rounded to about half an epsilon, so that their difference is off by about epsilon times their sum.
     """
