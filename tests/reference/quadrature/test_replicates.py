@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm, skew
 
 from reference.quadrature.area_lights import area_surface, beams_of
 from reference.quadrature.replicates import PILOT, REPLICATES, PointPlan, replicate_means, standard_error
@@ -68,26 +69,25 @@ def test_points_follow_the_error_that_is_asked_for():
 RUNS = 400
 
 
-def fraction_held(replicates_of, expected, doubt=0.0):
-    """Return how many intervals hold of each value, and of all together with the error of that fraction."""
-    held = []
-    for seed in range(RUNS):
-        replicates = replicates_of(PointPlan(seed=seed))
-        error = np.hypot(standard_error(replicates), doubt)
-        held.append(np.abs(replicates.mean(axis=-1) - expected) <= STUDENT * error)
-    held = np.array(held)
+def check_intervals(replicates_of, expected, doubt=0.0):
+    """Check how many of the intervals of 400 runs hold each value, and how many hold of all values together."""
+    runs = np.array([replicates_of(PointPlan(seed=seed)) for seed in range(RUNS)])
+    held = np.abs(runs.mean(axis=-1) - expected) <= STUDENT * np.hypot(standard_error(runs), doubt)
+    # Sums of few points are skewed. A skewness g of n replicates costs Student's intervals the probability
+    # 2 phi(t) t (t^4 + 2 t^2 - 3) g^2/(18 n) (Hall 1992, The Bootstrap and Edgeworth Expansion, section 2.6): 2 % for
+    # the value behind blinds with g = 0.8. One value has 400 tries: 4.5 standard errors of them.
+    skewness = skew(runs - expected[..., None], axis=(0, -1))
+    cost = 2 * norm.pdf(STUDENT) * STUDENT * (STUDENT**4 + 2 * STUDENT**2 - 3) * skewness**2 / (18 * REPLICATES)
+    probability = 0.95 - cost
+    assert np.all(held.mean(axis=0) >= probability - 4.5 * np.sqrt(probability * (1 - probability) / RUNS))
     # Values of one run share points: the runs are what is independent.
-    return held.mean(axis=0), held.mean(), held.mean(axis=1).std() / np.sqrt(RUNS)
-
-
-def check_fractions(each, all_of_them, error):
-    # One value: 400 tries with a probability of 0.95, 4.5 standard errors of 1.1 %.
-    assert each.min() >= 0.95 - 4.5 * np.sqrt(0.95 * 0.05 / RUNS)
-    assert all_of_them == pytest.approx(0.95, abs=0.01 + 2 * error)
+    assert held.mean() == pytest.approx(0.95, abs=0.01 + 2 * held.mean(axis=1).std() / np.sqrt(RUNS))
 
 
 @pytest.mark.statistical
-@pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a fraction of 400 runs, 1 % of all")
+@pytest.mark.claim(
+    "area-light-errors", tolerance="binomial, less the cost of skewness: 4.5 standard errors of 400 runs, 1 %"
+)
 def test_intervals_beside_a_lamp_hold(variant):
     sigma_t, radius, far = 0.21, 0.3, 2.0
     reference = lit_room(lamp("sphere", center=[0.0, 0.0, far], radius=radius), medium=fog(sigma_t, 1.0), empty=True)
@@ -103,11 +103,13 @@ def test_intervals_beside_a_lamp_hold(variant):
     )
     closed = [sphere_airlight(sigma_t, h, radius, foot=f, x0=0.0, x1=5.0) for h, f in zip(height, foot, strict=True)]
     expected = np.array(closed) * sigma_t / (4 * np.pi)
-    check_fractions(*fraction_held(lambda plan: airlight_replicates(rays, plan, np.full(3, 5.0))[:, 0], expected))
+    check_intervals(lambda plan: airlight_replicates(rays, plan, np.full(3, 5.0))[:, 0], expected)
 
 
 @pytest.mark.statistical
-@pytest.mark.claim("area-light-errors", tolerance="binomial: 4.5 standard errors of a fraction of 400 runs, 1 % of all")
+@pytest.mark.claim(
+    "area-light-errors", tolerance="binomial, less the cost of skewness: 4.5 standard errors of 400 runs, 1 %"
+)
 @pytest.mark.parametrize("layer", ["airlight", "surface"])
 @pytest.mark.parametrize("before", ["block", "blinds"])
 def test_intervals_in_a_penumbra_hold(variant, layer, before):
@@ -133,5 +135,4 @@ def test_intervals_in_a_penumbra_hold(variant, layer, before):
     fine = replicates(fixed(8192, seed=RUNS))
     lit = fine.mean(axis=1) > 0
     assert lit.sum() >= 5
-    found = fraction_held(lambda plan: replicates(plan)[lit], fine[lit].mean(axis=1), standard_error(fine[lit]))
-    check_fractions(*found)
+    check_intervals(lambda plan: replicates(plan)[lit], fine[lit].mean(axis=1), standard_error(fine[lit]))
