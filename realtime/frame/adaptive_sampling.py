@@ -3,7 +3,7 @@ r"""Airlight between the corners of tiles, where it is nearly linear: a wrapper 
 pixels.
 
 Most pixels of a frame lie in beams and shadows, few on their edges. A ray is therefore computed in the first pixel of
-every tile of 4 x 4, and all pixels of a tile only where its corners do not determine the airlight between them.
+every tile of 4 x 4, and all pixels only where these corners do not determine the airlight between.
 
 Let Delta be the second difference f_(i-1) - 2 f_i + f_(i+1) of the airlight along a row or a column of corners, h
 apart. Where f is smooth, linear interpolation misses it by up to |f''| h^2/8, which is Delta/8. Where it has a kink

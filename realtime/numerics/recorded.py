@@ -2,8 +2,7 @@
 """Frozen functions that Python's garbage collector does not interrupt.
 
 While Dr.Jit records a function, no memory of the device may be freed, and no object may vanish that virtual calls use:
-a Mitsuba scene that is collected in the middle ends the process, or the recording fails. Garbage is collected after the
-call.
+a Mitsuba scene that is collected in the middle ends the process, or the recording fails. Garbage is collected later.
 
 An exception in the function ends the recording as if the function had returned nothing, and is raised after the
 recording: Dr.Jit 1.5 answers an exception in a recording by aborting a later one.

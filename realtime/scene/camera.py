@@ -13,7 +13,7 @@ Rays start at the pinhole; the near clip plane does not cut the medium away (DES
 A direction that is rounded to float32 misses its aim by 6e-8 of the distance: 3e-7 m at a light 5 m away, which is 1e-4
 of the height of a ray that passes it at half a pixel, and of the airlight there. The camera's vectors and the aim of a
 ray therefore have float64, in which `realtime.rays` computes once where the ray passes a light; all else has the
-precision of the scene.
+scene's precision.
 """
 
 import math

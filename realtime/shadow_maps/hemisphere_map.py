@@ -12,8 +12,8 @@ quadrant, as inverse depth is in a perspective map, and a point is lit where its
 
 A point *on* a surface is compared with the value of the nearest corner, where the surface may be nearer to the light:
 by up to half of the change of 1/s from one corner to the next. A second array therefore holds the values less half of
-the slopes to the flatter side of rows and of columns: a plane never shadows itself, and an edge moves by less than half
-a texel.
+the slopes to the flatter side of rows and of columns: a plane never shadows itself, and edges move by less than half a
+texel.
 
 The maps of N points follow one another, and all are cast at once, so that the number of kernels does not grow with N.
 """

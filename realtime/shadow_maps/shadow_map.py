@@ -3,8 +3,7 @@
 
 A face is cut into size^2 texels over (u, v) in [-1, 1]^2 (`realtime.shadow_maps.projection`); a map holds at each of
 their (size + 1)^2 *corners* the distance *along the ray* from the light to the first surface [m], infinite where there
-is none. The outermost values therefore lie on the edges of the face, where the faces of a cube meet with the same
-values.
+is none. The outermost values therefore lie on the edges of the face, where faces of a cube meet with equal values.
 
 The face of a directional light is a rectangle across it that just covers the media. It lies where the media end; the
 ray of (u, v) starts at position + u across + v up - depth axis, before all shapes, and goes along the axis. Surfaces

@@ -9,8 +9,7 @@ ray, with phi the azimuth of such a half plane and l the arc length along the cu
 
 and h J(y) is bounded however close the ray passes: without extinction an unbounded ray receives (1 + cos) n_in from y,
 with cos the cosine of the angle in the half plane between normal and ray. Samples are therefore drawn by phi and l.
-These are polar coordinates about the ray, the same for all of its points, and each sample has the lit intervals of one
-point light.
+These are polar coordinates about the ray, the same for all of its points, with the lit intervals of one point light.
 
 A half plane cuts a rectangle, a triangle and a disk in a segment, a sphere of radius R in a circle of radius rho. There
 dA = R h dphi db with the angle b on the circle. The azimuths of a disk or sphere that the line of the ray misses are

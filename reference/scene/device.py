@@ -14,8 +14,7 @@ def on_device(kind: Any, numbers: ArrayLike) -> Any:
     """Return numbers, (n,), as an array of a kind such as `mi.Float64`.
 
     Dr.Jit reads NumPy's memory as it stands, and compiles a kernel for the alignment of all arrays that it reads: if
-    NumPy's alignment varies, the same kernel is compiled again and again. Numbers are therefore copied to Dr.Jit's
-    alignment.
+    NumPy's alignment varies, the same kernel is compiled again and again. Numbers are copied to Dr.Jit's alignment.
     """
     given = np.asarray(numbers)
     dtype = np.dtype({"Float32": "f4", "Float64": "f8", "UInt32": "u4"}[dr.type_v(kind).name])

@@ -2,8 +2,8 @@
 r"""The plane of a ray and a light, and the one map that projects all occluders to the ray.
 
 A light is a homogeneous position: a place p with w = 1, or the unit direction p towards it with w = 0. In the plane of
-a ray o + x d and the light let z be the component along d, and y the component across it on the light's side; the ray
-is y = 0. The light is at
+a ray o + x d and the light let z be the component along d, and y across it on the light's side; the ray is y = 0. The
+light is at
 
     (z_P, y_P) = (foot, height) of a place,      (cos, sin) of the angle between ray and light of a direction.
 

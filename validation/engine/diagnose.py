@@ -319,8 +319,7 @@ class _Attempt:
             return self.right
         scale = min(scale_of(each, self.pixel) for each in [self.right, *explanations])
         most = max(evidence(each, self.right, scale) for each in explanations)
-        # Among equally good explanations, such as a factor and a near plane before dark fog: the simplest, then the
-        # first.
+        # Among equals, such as a factor and a near plane before dark fog: the simplest, then the first.
         alike = [each for each in explanations if evidence(each, self.right, scale) >= most - _ALIKE]
         best = min(alike, key=lambda each: each.parameters)
         return best if is_enough(best, self.right, scale, self.predictor.pairs) else self.right

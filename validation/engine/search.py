@@ -66,8 +66,7 @@ def explain(
     faults are tried; `fine`: whether the values are found to all digits, or to some per cent, which is enough for a
     wrong fault.
     """
-    # Faults that move paths, which are found again for each value, are tried on few pixels first: enough to tell faults
-    # apart.
+    # Faults that move paths, which are found again for each value, are tried on few pixels first to tell faults apart.
     moves = any(parameter.step for fault in faults for parameter in fault.parameters)
     sought = [predictor.coarse if moves else predictor, *[predictor] * fine]
     searches = [_Search(each, tuple(faults)) for each in sought]

@@ -4,8 +4,8 @@
 Where a combination of steps changes no pixel, the derivatives are linearly dependent: albedo against intensity in the
 airlight, always; exposure against the intensity of the only light. Singular vectors of the derivatives, each column
 divided by its length, identify the combinations: those with a singular value below a millionth of the largest. As many
-of their parameters as can be known stay free; the later ones of the list are held, and the free ones stand for products
-with them.
+of their parameters as can be known stay free; later ones in the list are held, and free ones stand for products with
+them.
 """
 
 import math

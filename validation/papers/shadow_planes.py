@@ -2,8 +2,7 @@
 """Shadow planes of Biri 2006: the errors of their order and other shortcuts in images, and the stencil along a ray.
 
 Errors are relative RMSE and relative bias of the airlight against the quadrature. Whether an error is noticeable is
-judged on an 8-bit display: the number of its 255 steps within which 99 % of the pixels are right, with `white` shown as
-255.
+judged on an 8-bit display: the number of its 255 steps within which 99 % of pixels are right; `white` is 255.
 
 The stencil of sections 5 and 5.1.5 needs no image. Along a ray a shadow is an interval [a, b]. Its plane at a faces the
 camera, its plane at b faces away. Planes are drawn from the surface towards the camera: one that faces the camera adds

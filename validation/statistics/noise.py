@@ -129,8 +129,7 @@ def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list
     """Return the stages of a frame that got slower.
 
     Ratios of times mean something from `least` on, see `least_ratio`; `scale` is how much slower than before everything
-    else is [1], at least 1 on the same machine. Stages that got faster are found as those that get slower from new to
-    old.
+    else is [1], at least 1 on the same machine. Faster stages are those that get slower from new to old.
     """
     shared = [stage for stage in old if stage in new]
     before, after = ({stage: times[stage] for stage in shared} for times in (old, new))

@@ -93,8 +93,7 @@ def time_frame(
     `seconds` are spent on each of the first three, and half as long on each of the others. If a frame takes longer than
     `slow` with its preparation [s], `SLOW` by default, frames are run stage by stage and the seven times are added up
     from the stages: up to five frames in place of some forty. The same holds for images that are rendered in parts.
-    `took` is the time of the last frame with its preparation, if one was rendered just before [s]; else two are
-    rendered.
+    `took` is the time of the last frame with its preparation, if one was rendered just before [s]; else two are.
     """
     if len(parts(renderer)) > 1:
         return _slow_frame(renderer, turns=3)

@@ -12,8 +12,7 @@ before that, whose Gamma is added if it is lit, and the entry, a back facing tri
 drawn in the order of the planes. It subtracts its Gamma if the stencil is zero, and sets the stencil to 255: planes
 closer to the camera do not pass. For order=paper an entry therefore counts by the cosine of the angle at the light
 between the camera and itself, planes of a larger cosine are left out, and it comes last. The paper asks for small
-triangles, since their middles stand for them in the order: here they are points. Otherwise the planes behind the entry
-count.
+triangles, whose middles stand for them in the order: here they are points. Otherwise planes behind it count.
 
 **The frame buffer** holds the frame, not one sum: `start` is its content before.
 """

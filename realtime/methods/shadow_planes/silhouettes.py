@@ -10,8 +10,7 @@ is crossed with the coefficient
 
 The edges with c_e != 0 are the silhouette. As a sum of borders it is a cycle: at each vertex as many layers begin as
 end, *whatever signs w_t have*. A triangle whose plane holds the light, and whose sign is therefore a matter of
-rounding, changes the count only inside its own projection, which has no area; and the count over a direction is a whole
-number.
+rounding, changes the count only inside its own projection, which has no area; the count over a direction is whole.
 
 Layers:
 

@@ -132,8 +132,7 @@ class Medium(ABC):
         geometry
             Where they pass the light, a `realtime.rays.RayGeometry`.
         kernel, form
-            The kernel of `realtime.kernels`, and the form of `realtime.scene.media.bounded_rays`, for media that use
-            them.
+            A kernel, and a form of `realtime.scene.media.bounded_rays`, for media that use them.
         """
         return LitRays(self, light, rays, geometry, kernel)
 
