@@ -109,7 +109,7 @@ def compare(
     >>> compared.passed, compared.error.shape
     (True, (24, 32, 3))
     >>> fitted = airlight.compare("open-fog", exact, fit="sigma_t=1,intensity")
-    >>> abs(fitted["sigma_t"]["value"] / 0.173 - 1) < 1e-4
+    >>> abs(fitted["sigma_t"].value / 0.173 - 1) < 1e-4
     True
     """
     files = [Path(path) for path in several(output)]

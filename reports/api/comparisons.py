@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Comparisons as results: two images, an image with the reference of its scene, its diagnosis, its fit."""
 
-import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,11 +23,13 @@ from reports.plotting.pictures import (
     write_png,
 )
 from reports.tables.record import Said
-from reports.tables.table import Column, Interval, table
+from reports.tables.table import Interval, numbers, table, words
+from validation.columns import plain
 from validation.comparison.images import Comparison, shown
 from validation.engine.diagnose import Diagnosis
 from validation.engine.judge import EngineComparison
 from validation.fit.fit import Fit
+from validation.fit.fit import Fitted as FittedParameter
 from validation.metrics.errors import FLOOR, Metrics, colours
 from validation.motion.judge import MotionComparison
 from validation.motion.noise import NoiseComparison
@@ -131,7 +132,7 @@ def scene_comparison(compared: EngineComparison, files: Sequence[tuple[str, str]
 
 def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
     """Return what is wrong with an image: with each of airlight and surfaces where it has both as layers."""
-    several = [diagnosis.to_json()["diagnosis"] for diagnosis in diagnoses]
+    several = [plain(each) | {"explained": each.explained} for each in diagnoses]
     first, *others = (diagnosis.lines for diagnosis in diagnoses)
     return Said(
         name="diagnosis",
@@ -153,47 +154,28 @@ def frames_comparison(compared: MotionComparison | NoiseComparison) -> Said:
     )
 
 
-_FITTED = (
-    Column("name", "parameter", words=True),
-    Column("value", "value", digits=6),
-    Column("interval", "95 % interval", digits=6),
-    Column("scene", "in the scene", digits=6),
-)
-
-
 class Fitted(Said):
     """The parameters of the fog that explain an image; `of` has every number."""
 
-    def __getitem__(self, name: str) -> Mapping[str, Any]:
-        """Return 'value', 'low', 'high' and 'scene' of a parameter; lists where its channels differ."""
-        parameters: dict[str, Any] = self.data["parameters"]
-        return parameters[name]
+    def __getitem__(self, name: str) -> FittedParameter:
+        """Return a parameter, or a channel of it such as 'sigma_t.r': its value, low, high and scene."""
+        fit: Fit = self.of
+        return {each.name: each for each in fit.parameters}[name]
 
 
 def fitted(fit: Fit) -> Fitted:
     """Return a fit as a result."""
     values = ", ".join(f"{each.name}={each.value:.6g}" for each in fit.parameters)
-    data = json.loads(json.dumps(fit.to_json()))
+    columns = numbers(value="value", interval="95 % interval", scene="in the scene", how={"digits": 6})
+    rows = [(each.name, each.value, Interval.of((each.low, each.high)), each.scene) for each in fit.parameters]
     return Fitted(
         name=f"{fit.path} as {fit.scene}: {values}; relative RMSE left {fit.residual:.3g}",
-        data=data,
-        tables=(table("Parameters that explain the image", _FITTED, _fitted_rows(data["parameters"])),),
+        data=plain(fit),
+        tables=(table("Parameters that explain the image", (*words(name="parameter"), *columns), rows),),
         lines=fit.lines,
         good=not fit.failures,
         of=fit,
     )
-
-
-def _fitted_rows(parameters: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield a row for each parameter; channels have a row each."""
-    for name, each in parameters.items():
-        word, colon, place = name.partition(":")
-        several = {"": each}
-        if isinstance(each["value"], list):
-            several = {f".{c}": {key: value[i] for key, value in each.items()} for i, c in enumerate("rgb")}
-        for channel, of_it in several.items():
-            ends = Interval.of((of_it["low"], of_it["high"]))
-            yield {**of_it, "name": f"{word}{channel}{colon}{place}", "interval": ends}
 
 
 def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None) -> str:

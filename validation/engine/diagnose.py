@@ -14,7 +14,6 @@ from typing import Any
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
 from validation.arrays import Progress
-from validation.columns import plain
 from validation.engine.error_place import place_words
 from validation.engine.evidence import (
     LEAST_EFFECT,
@@ -82,14 +81,6 @@ class Diagnosis:
     rest: str  #: what that is: noise, little, or less than a tenth of what it was; empty where it is none of these
     place: str  #: where the remaining error lies; empty where it is noise, or little
     failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
-
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name."""
-        numbers = {name: plain(getattr(self, name)) for name in ("residual", "left")}
-        words = {name: getattr(self, name) for name in ("first", "layer", "pixel", "rest", "place")}
-        words["explained"] = self.explained
-        ranked, failures = [plain(row) for row in self.ranked], list(self.failures)
-        return {"diagnosis": {**words, **numbers, "ranked": ranked, "failures": failures}}
 
     @property
     def explained(self) -> bool:

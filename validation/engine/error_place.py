@@ -3,7 +3,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import binary_dilation, laplace, maximum_filter, minimum_filter
@@ -11,7 +10,6 @@ from scipy.ndimage import binary_dilation, laplace, maximum_filter, minimum_filt
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import ReferenceScene
 from validation.arrays import Array, Bools
-from validation.columns import plain
 from validation.engine.prediction import Predictor
 from validation.engine.search import Explanation
 
@@ -37,10 +35,6 @@ class ErrorPlace:
     kind: str  #: 'lamp', 'edge' or '' for neither
     relative_rmse_without: float  #: the relative rmse of all other pixels
     few: bool  #: whether they are less than a hundredth of the image
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name."""
-        return plain(self)
 
     @property
     def words(self) -> str:

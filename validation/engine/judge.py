@@ -79,10 +79,6 @@ class Verdict:
         """Whether the image is right."""
         return not self.reasons
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the numbers by name."""
-        return {"right": self.right, **plain(self)}
-
     @property
     def words(self) -> str:
         """Return a sentence."""
@@ -152,8 +148,8 @@ class EngineComparison:
             "factor_rmse": plain(self.hints.factor_rmse),
             "hints": list(self.hints.words),
             "pixel_errors": {kind: plain(self.kind.errors.get(kind)) for kind in PIXELS},
-            "where": None if self.place is None else self.place.to_json(),
-            "verdict": self.verdict.to_json(),
+            "where": plain(self.place),
+            "verdict": {"right": self.verdict.right, **plain(self.verdict)},
             "note": self.note,
             "failures": list(self.failures),
         }

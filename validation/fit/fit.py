@@ -2,10 +2,9 @@
 """The parameters of the fog that explain an image file of a scene, with their intervals."""
 
 import math
-import re
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from analytic.errors import InputError
 from reference.storage.exr import Image
 from validation.arrays import Array, Bools, Progress
-from validation.columns import plain
 from validation.engine.judged_layer import judged_layer
 from validation.engine.seen import (
     Seen,
@@ -49,7 +47,6 @@ _FEW_RAYS = 3000  # on which starts are compared
 _FEWER = 4
 _FEWEST = 16  # pixels
 _MANY = 0.1  # fraction of the pixels: if more are left out, the reader should look why
-_CHANNEL = re.compile(r"^([^:]*)\.[rgb](?=:|$)")  # of the name of a parameter, which a medium may follow
 _BAD = 0.99  # fraction of the variance: an image that is explained less is not understood
 
 
@@ -74,7 +71,6 @@ class Fit:
     holds: str  #: what the layer holds: 'airlight', 'surface' or 'total'
     pixel: str  #: 'centre' or 'area'
     parameters: tuple[Fitted, ...]
-    groups: tuple[tuple[str, tuple[int, ...]], ...]  #: by name for JSON, which of `parameters` are its channels
     residual: float  #: relative rmse that is left, over the pixels that took part
     explained: float  #: fraction of the image's variance
     pixels: int  #: that were looked at
@@ -83,29 +79,6 @@ class Fit:
     confounded: tuple[Confounded, ...]
     seconds: float  #: that the fit took, with the paths of light
     failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
-
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name. A parameter of three channels has lists of three."""
-        parameters: dict[str, Any] = {}
-        for name, members in self.groups:
-            rows = [self.parameters[number] for number in members]
-            row = {key: [plain(getattr(each, key)) for each in rows] for key in ("value", "low", "high", "scene")}
-            parameters[name] = row if len(rows) > 1 else {key: values[0] for key, values in row.items()}
-        return {
-            "scene": self.scene,
-            "file": self.path,
-            "holds": self.holds,
-            "pixel": self.pixel,
-            "parameters": parameters,
-            "residual": plain(self.residual),
-            "explained": plain(self.explained),
-            "noise": plain(self.noise),
-            "pixels": self.pixels,
-            "left_out": self.left_out,
-            "confounded": [asdict(each) for each in self.confounded],
-            "seconds": plain(self.seconds),
-            "failures": list(self.failures),
-        }
 
     @property
     def lines(self) -> list[str]:
@@ -293,7 +266,6 @@ def _fit(
     return Fit(
         *what,
         tuple(rows),
-        _by_name(unknowns),
         float(np.sqrt(np.mean(residual**2))) / mean if mean > 0 else math.nan,
         1 - float(np.sum(residual**2)) / spread if spread > 0 else math.nan,
         len(kept),
@@ -306,16 +278,3 @@ def _fit(
 
 def _finite(value: Any) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-def _by_name(unknowns: Sequence[Unknown]) -> tuple[tuple[str, tuple[int, ...]], ...]:
-    """Return the rows that JSON shows together: three channels that stand for one word."""
-    names: dict[str, list[int]] = {}
-    for number, unknown in enumerate(unknowns):
-        names.setdefault(_CHANNEL.sub(r"\1", unknown.name), []).append(number)
-    rows: list[tuple[str, tuple[int, ...]]] = []
-    for name, numbers in names.items():
-        # A channel that was asked for by itself keeps its name.
-        together = len(numbers) == 3 or name == unknowns[numbers[0]].name
-        rows += [(name, tuple(numbers))] if together else [(unknowns[number].name, (number,)) for number in numbers]
-    return tuple(sorted(rows, key=lambda entry: entry[1]))
