@@ -2,6 +2,7 @@
 """`airlight.reference`: the reference of a scene, by the certified integral or by samples, here or on workers."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -202,22 +203,19 @@ def _elsewhere(
 
 
 def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]) -> "Reference":
-    import numpy as np
-
     from reports.api.results import Reference, sealed
+    from reports.report.scene import reference_record
     from validation.estimates.images import whole_reference
     from validation.estimates.quadrature import reference_image
 
     found = reference_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
-    finite = np.isfinite(found.airlight)
-    mean = float(found.airlight[finite].mean()) if finite.any() else 0.0
-    counts = ("transitions", "checked", "disagreements", "refined", "left")
+    said = reference_record(found)
     return Reference(
         scene=loaded.name,
         image=sealed(whole_reference(loaded, found, pixel=pixel)),
         estimator="quadrature",
-        relative_error=float(found.airlight_bound[finite].mean()) / mean if mean > 0 else float("nan"),
-        details={"pixel": pixel} | {name: getattr(found, name) for name in counts},
+        relative_error=float("nan") if said.relative_bound is None else said.relative_bound,
+        how=said,
     )
 
 
@@ -238,14 +236,13 @@ def _sampled(
     found = monte_carlo_reference(
         loaded, estimator, budget=budget, seed=seed, orders=chosen, progress=tell, elsewhere=elsewhere
     )
-    counted = {"cached": found.cached, "damaged": found.damaged, "masked": found.masked}
-    errors = {"pooled_error": found.errors["pooled"], "worst_error": found.errors["worst"], "reached": found.reached}
+    found = replace(found, image=sealed(found.image))
     return Reference(
         scene=loaded.name,
-        image=sealed(found.image),
+        image=found.image,
         estimator=estimator,
         relative_error=found.errors["pooled"],
-        details=_batches(found.image.attributes) | counted | errors,
+        how=found,
     )
 
 
@@ -264,12 +261,7 @@ def _merged(scene: str, files: list[Path]) -> "Reference":
         image=sealed(image),
         estimator=str(image.attributes["airlight:estimator"]),
         relative_error=float("nan"),
-        details=_batches(image.attributes),
     )
-
-
-def _batches(attributes: Any) -> dict[str, Any]:
-    return {name: attributes[f"airlight:{name}"] for name in ("spp", "batch_spp", "batches", "seeds")}
 
 
 def _budget(given: dict[str, Any], *, usual: int) -> "Budget":

@@ -9,7 +9,7 @@ reference, whose error is far below what float32 can hold.
 import os
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 from analytic.errors import InputError
 from reference.storage.exr import TOTAL, Image
 from reference.storage.exr import layer as image_layer
+from reports.data.records import Reference as QuadratureReference
 from reports.plotting.pictures import (
     ToneCurve,
     exposure,
@@ -32,10 +33,12 @@ from reports.plotting.pictures import (
 from reports.tables.methods import rate_words
 from reports.tables.record import Result, Said
 from validation.columns import plain
+from validation.estimates.images import MonteCarloReference
 from validation.timing import FrameTimes
 
 Array = NDArray[np.floating]
 _NOTHING = "nothing written"
+_MADE = ("pixel", "spp", "batch_spp", "batches", "seeds")  # of the header of a reference
 
 
 def sealed(image: Image) -> Image:
@@ -228,8 +231,8 @@ class Reference(LayeredImage):
 
     estimator: str  #: 'quadrature', 'single-scatter', 'volpath' or 'cloud-paths'
     relative_error: float  #: the mean bound of the airlight over its mean, or the relative standard error of the image
-    #: How it was made, with samples, seeds, shadow rays that checked the intervals.
-    details: Mapping[str, Any] = field(default_factory=dict)
+    #: Shadow rays that checked the quadrature, or batches of an estimator that samples; None of merged files.
+    how: QuadratureReference | MonteCarloReference | None = None
 
     @property
     def bound(self) -> Array | None:
@@ -249,34 +252,37 @@ class Reference(LayeredImage):
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight reference --json` prints, without the files."""
         means = {name: layer.mean(axis=(0, 1)).tolist() for name, layer in self.image.layers.items()}
-        return plain({"scene": self.scene, "estimator": self.estimator, "means": means, **self.details})
+        names = (name for name in _MADE if f"airlight:{name}" in self.image.attributes)
+        data: dict[str, Any] = {"scene": self.scene, "estimator": self.estimator, "means": means}
+        data |= {name: self.image.attributes[f"airlight:{name}"] for name in names}
+        if isinstance(self.how, MonteCarloReference):
+            data |= {name: getattr(self.how, name) for name in ("cached", "damaged", "masked", "reached")}
+            data |= {f"{name}_error": error for name, error in self.how.errors.items()}
+        return plain(data if self.how is None or "cached" in data else data | asdict(self.how))
 
     @property
     def passed(self) -> bool:
         """Whether the error that was asked for was reached."""
-        return self.details.get("reached") is not False
+        return not isinstance(self.how, MonteCarloReference) or self.how.reached is not False
 
     @property
     def lines(self) -> Sequence[str]:
         """Its means and its error."""
-        lines = [self.title]
-        for name, mean in self.to_dict()["means"].items():
+        lines, made = [self.title], self.to_dict()
+        for name, mean in made["means"].items():
             unit = "" if name == "opacity" else " W/(m^2 sr)"
             lines.append(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)}{unit}")
-        made = self.details
         if "batches" not in made:
             return lines
-        batches = int(made["batches"])
+        batches, how = int(made["batches"]), self.how
         lines.append(f"  {made['spp']} samples a pixel in {batches} batches, seeds {made['seeds']}")
-        if made.get("cached"):
-            lines.append(f"  {made['cached']} of {batches} batches from the cache")
-        if made.get("damaged"):
-            files = "file" if made["damaged"] == 1 else "files"
-            lines.append(f"  {made['damaged']} damaged {files} of the cache traced again")
-        if "pooled_error" in made:
-            left_out = f"; {made['masked']} pixels beside a light left out" if made["masked"] else ""
-            worst = f"{100 * made['worst_error']:.3g} % of the worst pixel"
-            lines.append(f"  standard error {100 * made['pooled_error']:.3g} % of the image, {worst}{left_out}")
+        if isinstance(how, MonteCarloReference):
+            lines += [f"  {how.cached} of {batches} batches from the cache"] if how.cached else []
+            files = "file" if how.damaged == 1 else "files"
+            lines += [f"  {how.damaged} damaged {files} of the cache traced again"] if how.damaged else []
+            left_out = f"; {how.masked} pixels beside a light left out" if how.masked else ""
+            worst = f"{100 * how.errors['worst']:.3g} % of the worst pixel"
+            lines.append(f"  standard error {100 * how.errors['pooled']:.3g} % of the image, {worst}{left_out}")
         if batches < 32:
             known = 100 / (2 * (batches - 1)) ** 0.5
             lines.append(f"  a standard error from {batches} batches is known to {known:.0f} % only")

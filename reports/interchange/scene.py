@@ -48,6 +48,9 @@ CONVENTION = (
 def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     """Return everything that a renderer needs to render a scene, at the size of its image, as plain data.
 
+    These are dictionaries, not records: other programs read them as JSON, and their keys differ by the kind of a light
+    or a medium.
+
     These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`,
     `surfaces`, `radiance`, `notes`, `file`, and `properties`, the scene as `cycles_properties` returns it;
     of a random scene also `drawn`. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in

@@ -135,7 +135,10 @@ def paper_rows(results: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Judged]
 
 
 def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[Judged]:
-    """Return the claims whose experiments were made, and those that no experiment can measure."""
+    """Return the claims whose experiments were made, and those that no experiment can measure.
+
+    `figures`, by experiment: numbers by the names that claims.toml gives them, a free set and so no record.
+    """
     return [
         judged(claim, figures.get(claim.experiment, {}))
         for claim in chosen

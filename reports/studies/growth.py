@@ -3,9 +3,9 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analytic.errors import InputError
 from reports.api.inputs import (
@@ -25,8 +25,11 @@ from reports.api.inputs import (
 from reports.machine.progress import counted, part_of
 from reports.studies.methods import cells_of, check_study, loaded_scenes, scene_by_scene
 from reports.studies.registry import FRACTION, Study, with_environment
-from reports.tables.table import numbers, table
+from reports.tables.table import Table, numbers, table
 from validation.timing import Scaling, StepCost
+
+if TYPE_CHECKING:
+    from validation.metrics.errors import Metrics
 
 
 @with_kernels
@@ -155,7 +158,6 @@ def map_size(
     from realtime.scene.read_scene import read_scene
     from realtime.shadow_maps.shadow_map import check_size
     from reports.api.render import checked_configuration
-    from validation.columns import plain
     from validation.study.configuration import parse_settings, prepared
     from validation.study.growth import fitted_exponent
     from validation.study.study import standard_study
@@ -179,36 +181,60 @@ def map_size(
     for each in loaded:  # refuse unusable scenes, and maps that exceed the memory, before any work
         prepared(read_scene(each.scene), by_size[-1])
     label = replace(by_size[0], parameters=tuple(each for each in by_size[0].parameters if each[0] != "map")).label
-    tables, said, rows, data, drawn = [], [], [], [], []
+    found: list[MapErrors] = []
     for scene, tell in scene_by_scene(loaded, "map-size", progress):
         *_, cell = cells_of(scene, usual.measure, apart=apart)
-        errors: list[dict[str, Any]] = []
+        errors: list[Metrics] = []
         for number, chosen in enumerate(by_size):
             tell(number / len(by_size), chosen.label)
             row = cell(chosen)[0]
             if row.error is None:
                 raise InputError(f"{scene.name}, {chosen.label}: {row.reason}")
-            errors.append({"map": texels[number], **vars(row.error)})
-        rows += [{"scene": scene.name, "label": label, **each} for each in errors]
-        title = "{}, {} x {}, {}: error".format(scene.name, *scene.size, label)
-        tables.append(table(title, (*numbers("map"), *_FRACTIONS), errors))
-        exponent, scatter = fitted_exponent(texels, [each["relative_rmse"] for each in errors])
-        power = f"falls as size^-({-exponent:.2f} +- {scatter:.1g})"
-        said.append(f"{scene.name}: the relative RMSE {power if math.isfinite(exponent) else _FEW}.")
-        order = -exponent, scatter
-        data.append({"name": scene.name, "method": label, "errors": plain(errors), "order": plain(order)})
-        drawn.append((scene.name, [each["relative_rmse"] for each in errors], *order))
+            errors.append(row.error)
+        exponent, scatter = fitted_exponent(texels, [each.relative_rmse or 0.0 for each in errors])
+        found.append(MapErrors(scene.name, scene.size, label, tuple(texels), tuple(errors), -exponent, scatter))
+    rows = [{"scene": each.scene, "label": label, **row} for each in found for row in each.rows]
     return Study(
         name="map-size",
-        data=with_environment(size=list(loaded[0].size), maps=texels, scenes=data),
-        tables=tuple(tables),
-        lines=tuple(said),
+        data=with_environment(scenes=found),
+        tables=tuple(each.table for each in found),
+        lines=tuple(each.words for each in found),
         rows=tuple(rows),
-        draw=partial(_draw_maps, label, texels, drawn),
+        draw=partial(_draw_maps, found),
     )
 
 
-def _draw_maps(label: str, texels: list[int], drawn: list[tuple[str, list[float], float, float]], column: str) -> Any:
+@dataclass(frozen=True)
+class MapErrors:
+    """The errors of a method in a scene by the size of its map."""
+
+    scene: str
+    size: tuple[int, int]  #: of the image [pixels]
+    label: str  #: of the method, without the size of the map
+    maps: tuple[int, ...]  #: side of the map [texels]
+    errors: "tuple[Metrics, ...]"
+    order: float  #: the relative RMSE falls as size^-order; not finite where too few errors are above 0
+    order_error: float  #: its standard error
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The errors by name, a row for each size."""
+        return [{"map": side, **vars(error)} for side, error in zip(self.maps, self.errors)]
+
+    @property
+    def table(self) -> Table:
+        """The errors of each size."""
+        title = "{}, {} x {}, {}: error".format(self.scene, *self.size, self.label)
+        return table(title, (*numbers("map"), *_FRACTIONS), self.rows)
+
+    @property
+    def words(self) -> str:
+        """How the error falls with the size."""
+        power = f"falls as size^-({self.order:.2f} +- {self.order_error:.1g})"
+        return f"{self.scene}: the relative RMSE {power if math.isfinite(self.order) else _FEW}."
+
+
+def _draw_maps(found: list[MapErrors], column: str) -> Any:
     """Return the error over the size of the map, a line for each scene, with the fitted slope."""
     import numpy as np
 
@@ -218,15 +244,16 @@ def _draw_maps(label: str, texels: list[int], drawn: list[tuple[str, list[float]
     width = WIDTHS[column]
     figure = new_figure(width, 0.45 * width if column == "double" else 1.05 * width)
     panel = figure.subplots()
-    sizes = np.array(texels)
-    for (name, errors, order, standard_error), style in zip(drawn, scene_styles()):
-        values = np.array(errors, dtype=float)
-        panel.plot(sizes, values, linestyle="none", label=f"{name}: order {order:.2f} ± {standard_error:.2f}", **style)
-        if np.isfinite(order):
-            level = np.exp(np.mean(np.log(values[values > 0]) + order * np.log(sizes[values > 0])))
-            panel.plot(sizes, level * sizes**-order, color=style["color"])
-    panel.set(xscale="log", yscale="log", title=label)
+    sizes = np.array(found[0].maps)
+    for each, style in zip(found, scene_styles()):
+        values = np.array([error.relative_rmse for error in each.errors], dtype=float)
+        label = f"{each.scene}: order {each.order:.2f} ± {each.order_error:.2f}"
+        panel.plot(sizes, values, linestyle="none", label=label, **style)
+        if np.isfinite(each.order):
+            level = np.exp(np.mean(np.log(values[values > 0]) + each.order * np.log(sizes[values > 0])))
+            panel.plot(sizes, level * sizes**-each.order, color=style["color"])
+    panel.set(xscale="log", yscale="log", title=found[0].label)
     panel.set(xlabel="side of the shadow map [texels]", ylabel="relative RMSE of the airlight [1]")
-    name_sizes(panel, texels)
+    name_sizes(panel, found[0].maps)
     panel.legend(loc="best")
     return figure

@@ -24,7 +24,9 @@ ENDINGS = (".csv", ".tex", ".md", ".json", ".pdf", ".png")  #: of the files that
 class Study(Said):
     """The outcome of a study; its data are what `airlight study NAME --json` prints."""
 
-    rows: tuple[Mapping[str, Any], ...] = ()  #: a row for each measurement, plain numbers by name
+    #: A row for each measurement, plain numbers by name: mappings, as each study has columns of its own, which CSV
+    #: files and data frames take by name.
+    rows: tuple[Mapping[str, Any], ...] = ()
     draw: "Callable[[str], Figure] | None" = None  #: returns the figure for a column, 'single' or 'double'
 
     def __len__(self) -> int:

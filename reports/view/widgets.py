@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Data for the widgets of the page, and the commands that show or render its frame again.
 
-All of it follows from typed records, nothing is listed here. The page gets JSON, made from dictionaries here.
+All of it follows from typed records, nothing is listed here. Functions return dictionaries: the messages of the page,
+which a script reads and no Python.
 """
 
 import shlex

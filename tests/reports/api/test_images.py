@@ -94,7 +94,7 @@ def test_the_reference_with_its_bound(variant, own_cache):
     assert reference.airlight.dtype == np.float64
     assert reference.standard_error is reference.surface_standard_error is None
     assert reference.relative_error == pytest.approx(float(reference.bound.mean() / reference.airlight.mean()))
-    assert reference.details["left"] == 0
+    assert reference.how.left == 0
     assert told[-1] == (1.0, "quadrature")
     assert np.isfinite(reference.depth).any()
 
@@ -103,8 +103,8 @@ def test_a_reference_by_samples_with_its_standard_error(variant):
     traced = airlight.reference("open-fog", "single-scatter", size=TINY, samples=64, seed=7)
     reference = airlight.reference("open-fog", size=TINY)
     assert traced.bound is None
-    assert traced.details["spp"] == 64
-    assert traced.details["seeds"].startswith("7")
+    assert traced.image.attributes["airlight:spp"] == 64
+    assert traced.image.attributes["airlight:seeds"].startswith("7")
     assert 0 < traced.relative_error < 0.1
     compared = airlight.compare(traced, reference, margin=0.1)
     assert compared.statistics.equivalent

@@ -91,8 +91,8 @@ def test_maps_print_errors_by_size(variant, capfd):
     march = ["--method", "ray-march", "--set", "shadow=map", "--set", "steps=16"]
     data = printed(capfd, *arguments, *march)
     (scene,) = data["scenes"]
-    assert (scene["name"], scene["method"]) == ("omni-box", "ray-march (shadow=map, steps=16)")
-    assert data["maps"] == [metrics["map"] for metrics in scene["errors"]] == [16, 32]
+    assert (scene["scene"], scene["label"]) == ("omni-box", "ray-march (shadow=map, steps=16)")
+    assert scene["maps"] == [16, 32]
     assert all(metrics["relative_rmse"] > 0 for metrics in scene["errors"])
 
 
