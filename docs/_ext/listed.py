@@ -88,7 +88,7 @@ def _cell(words: str) -> str:
 
 def methods() -> str:
     """Return the methods with links to their sections."""
-    shown = list_("methods").kinds["methods"].only("name", "what", "kernel", "shadows", "source")
+    shown = list_("methods").tables[0].only("name", "what", "kernel", "shadows", "source")
     return markdown(_named(shown, lambda name: f"methods.md#{name}"))
 
 
@@ -141,7 +141,7 @@ def _parameter(item: Any) -> tuple[str, str]:
 
 def kernels() -> str:
     """Return the kernels."""
-    return markdown(_named(list_("kernels").kinds["kernels"]))
+    return markdown(_named(list_("kernels").tables[0]))
 
 
 def studies() -> str:

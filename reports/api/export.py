@@ -4,7 +4,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from analytic.errors import InputError
 from reports import __version__
@@ -33,10 +33,6 @@ class Exported(Result):
     def title(self) -> str:
         """The kernel, the phase function and the language."""
         return f"{self.kernel}, {self.phase}, {self.language}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the text with what it is, and its largest error."""
-        return {name: getattr(self, name) for name in ("kernel", "language", "phase", "error", "code")}
 
     @property
     def lines(self) -> list[str]:

@@ -4,7 +4,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,10 +47,6 @@ class SweepRun(Result):
     problems: tuple[Problem, ...]
     output: str  #: folder
     parquet: str | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight sweep --json` prints."""
-        return asdict(self)
 
     @property
     def passed(self) -> bool:

@@ -2,8 +2,7 @@
 """Groups of tasks as Dask futures: every task ends in one outcome, whatever happens to its process.
 
 A group is tasks that share what a process loads and compiles, and the value of one first task, such as the reference of
-a scene: it is one future, done by one worker. Groups are sent as there is room, so that the scheduler never holds more
-than a few for each worker. Dask moves what was lost with a worker to another one.
+a scene: it is one future, done by one worker.
 
 There is one rule for a process that dies under its work: a group is split into its tasks, and a task that is alone is
 tried again `retries` times, then it is 'aborted'. A task that takes longer than its limit ends its own process by a
@@ -26,7 +25,6 @@ from reports.cluster.connect import Client, facts
 
 ALONE = "alone"  #: the Dask resource of a worker on whose host nothing else runs
 
-_ROOM = 2  # groups that wait at the scheduler beside one for each worker
 _SENT = 0.004  # until what a worker says is on its way, twice the interval of Dask's batches [s]
 _FREE, _RETIRE = 1.2 * 2**30, 1.6 * 2**30  # memory from which a worker gives some back, starts again [bytes]
 
@@ -68,15 +66,14 @@ class _Refused(Exception):
 def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, retries: int = 3) -> Iterator[Outcome]:
     """Yield the outcome of every task of the groups; a first task that failed is the outcome of all its tasks.
 
-    Groups are read as there is room for them. Workers must be made of `made`, `validation.study.keys.Made`; another
-    version is refused by name. None takes any. A task whose process died is begun again `retries` times.
+    Workers must be made of `made`, `validation.study.keys.Made`; another version is refused by name. None takes any. A
+    task whose process died is begun again `retries` times.
     """
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
 
     from analytic.errors import InputError
 
-    waiting = iter(groups)
     topic = f"airlight-{uuid.uuid4().hex[:12]}"
     begun: dict[str, tuple[str, float]] = {}  # by future: which task began last, and when [s]
     flying: dict[Any, tuple[Group, int]] = {}  # groups that were sent, and how often
@@ -90,14 +87,9 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
         flying[future] = group, attempts
         ended.add(future)
 
-    def fill() -> None:
-        room = _ROOM + len(client.scheduler_info(n_workers=-1)["workers"])
-        while len(flying) < room and (group := next(waiting, None)) is not None:
-            if group.tasks:
-                send(group)
-
     try:
-        fill()
+        for group in groups:
+            send(group)
         for future in ended:
             group, attempts = flying.pop(future)
             try:
@@ -126,7 +118,6 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
                     send(group, attempts)
                 else:
                     yield from _all(group, "failed", " ".join(f"{type(error).__name__}: {error}".split()), attempts)
-            fill()
     finally:
         with suppress(Exception):  # the scheduler may be gone
             client.cancel(list(flying), force=True)

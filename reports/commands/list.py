@@ -1,41 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.list`: the built-in scenes, methods, kernels, studies and papers."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Literal
 
 from analytic.errors import InputError, nearest
 from reports.tables.drawing import text_of
-from reports.tables.record import Result
+from reports.tables.record import Said
 from reports.tables.table import Table, table, words
 
 _LONG = {"long": True}
 
 
-@dataclass(frozen=True, repr=False)
-class Listing(Result):
-    """The available names, a table for each kind."""
-
-    kinds: Mapping[str, Table]
-    single: bool  #: whether one kind was asked for
-
-    def to_dict(self) -> Any:
-        """Return the rows as words: by kind, or of the requested one."""
-        data = {
-            kind: [{key: text_of(value) for key, value in row.values.items()} for row in each.rows]
-            for kind, each in self.kinds.items()
-        }
-        return next(iter(data.values())) if self.single else data
-
-    @property
-    def tables(self) -> Sequence[Table]:
-        """The tables."""
-        named = {} if self.single else {kind: kind.capitalize() for kind in self.kinds}
-        return [replace(each, title=named.get(kind, "")) for kind, each in self.kinds.items()]
-
-
-def list_(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None) -> Listing:
+def list_(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None) -> Said:
     """List the built-in scenes, methods, kernels, studies and papers.
 
     The lists of methods and kernels name their parameters with the defaults, which `--set` changes.
@@ -48,8 +26,15 @@ def list_(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | N
     kinds = {"scenes": _scenes, "methods": _methods, "kernels": _kernels, "studies": _studies, "papers": _papers}
     if what is not None and what not in kinds:
         raise InputError(f"list: got {what!r}, wanted one of {', '.join(kinds)}" + nearest(what, kinds))
-    chosen = kinds if what is None else {what: kinds[what]}
-    return Listing({kind: made() for kind, made in chosen.items()}, what is not None)
+    if what is not None:
+        shown = kinds[what]()
+        return Said(name=what, data=_data(shown), tables=(shown,))
+    tables = {kind: replace(made(), title=kind.capitalize()) for kind, made in kinds.items()}
+    return Said(name="list", data={kind: _data(each) for kind, each in tables.items()}, tables=[*tables.values()])
+
+
+def _data(shown: Table) -> list[dict[str, str]]:
+    return [{key: text_of(value) for key, value in row.values.items()} for row in shown.rows]
 
 
 def _scenes() -> Table:

@@ -89,8 +89,10 @@ class Result:
         return 0 if self.passed else 1
 
     def to_dict(self) -> Any:
-        """Return its data, as JSON has them."""
-        raise NotImplementedError
+        """Return its data, as JSON has them: the fields of the record by default."""
+        from validation.columns import plain
+
+        return plain(self)
 
     def text(self, *, width: int | None = None, styled: bool = False) -> str:
         """Return what it says for a terminal."""
