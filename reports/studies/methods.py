@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Studies of methods: times and errors, and errors by cause."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, fields
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from validation.columns import shown_values
 if TYPE_CHECKING:
     from validation.study.causes import ErrorPart
     from validation.study.configuration import Configuration
+    from validation.study.row import Row as CellRow
 
 
 def loaded_scenes(scenes: Any, size: Any) -> list[Any]:
@@ -85,18 +86,13 @@ def check_study(
 
 
 class MethodsStudy(Study):
-    """Speed against error: a row for each configuration in each scene.
+    """Speed against error: a row for each configuration in each scene, a record as those of `airlight sweep`.
 
-    A row has `scene`, `width`, `height`, `label`, `method`, `kernel`; medians `frame_ms` with its quartiles
-    `frame_low_ms` and `frame_high_ms`, `airlight_ms`, `surface_ms`, `light_moved_ms`, `objects_moved_ms`
-    (after these moved), `light_moved_camera_cached_ms` (after the light moved, camera rays cached),
-    `colours_changed_ms` (after only medium or colours changed) [ms]; of the airlight `relative_rmse`, `relative_bias`,
-    `p50`, `p99`, `max`,
-    `nonfinite` and `negative`; `refused`, why the method cannot render the scene, and `note`. Missing values
-    are None.
+    A row has `scene`, `label`, `method`, `kernel`, `times` (such as `times.frame.median_ms`), `error` (such as
+    `error.relative_rmse`), and `reason`, why the method cannot render the scene. Missing values are None.
     """
 
-    def fastest(self, error: float, scene: str | None = None) -> Mapping[str, Any] | None:
+    def fastest(self, error: float, scene: str | None = None) -> "CellRow | None":
         """Return the row of the fastest frame whose relative RMSE is at most `error`; None where there is none.
 
         Parameters
@@ -106,13 +102,10 @@ class MethodsStudy(Study):
         scene
             Its name; all scenes by default.
         """
-        fit = [row for row in self.rows if scene in (None, row["scene"]) and _reaches(row, error)]
-        return min(fit, key=lambda row: row["frame_ms"], default=None)
+        from reports.tables.methods import fastest_within
 
-
-def _reaches(row: Mapping[str, Any], error: float) -> bool:
-    known = row["frame_ms"] is not None and row["relative_rmse"] is not None
-    return known and row["relative_rmse"] <= error and not row["nonfinite"]
+        found = fastest_within(error, [row for row in self.rows if scene in (None, row.scene)])
+        return found and found[0]
 
 
 @with_kernels
@@ -153,9 +146,9 @@ def methods(
     --------
     >>> import airlight
     >>> found = airlight.study("methods", "open-fog", method="unshadowed", size=(32, 24), seconds=0.01)
-    >>> [row["label"] for row in found]
+    >>> [row.label for row in found]
     ['unshadowed (taylor)', 'unshadowed (quadrature)', 'unshadowed (exact)']
-    >>> found.fastest(1e-3)["relative_rmse"] < 1e-3
+    >>> found.fastest(1e-3).error.relative_rmse < 1e-3
     True
     """
     from reports.api.render import asked_configurations
@@ -176,7 +169,7 @@ def methods(
             tell(at / len(useful), each.label)
             row = cell(each)[0]
             records.append(row_record(row, {}))
-            rows.append({**_flat(row, each), "scene": scene.name})
+            rows.append(replace(row, scene=scene.name))
         benched.append({"name": scene.name, "size": [*scene.size], "methods": [asdict(each) for each in records]})
         tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), records))
         wrong += own_faults(records)
@@ -187,21 +180,6 @@ def methods(
         rows=tuple(rows),
         faults=tuple(dict.fromkeys(wrong)),
     )
-
-
-def _flat(row: Any, chosen: Any) -> dict[str, Any]:
-    """Return the numbers of a row, see `MethodsStudy`."""
-    from validation.timing import FrameTimes
-
-    times, error = row.times, row.error
-    flat: dict[str, Any] = {name: getattr(row, name) for name in ("scene", "width", "height", "label", "method")}
-    flat |= {"kernel": row.kernel, "parameters": dict(chosen.parameters)}
-    flat |= {"frame_low_ms": times and times.frame.low_ms, "frame_high_ms": times and times.frame.high_ms}
-    medians = times.medians if times else {}
-    flat |= {f"{each.name}_ms": medians.get(each.name) for each in fields(FrameTimes)}
-    for name in ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative"):
-        flat[name] = error and getattr(error, name)
-    return flat | {"refused": row.reason, "note": row.note}
 
 
 # Errors by cause

@@ -24,15 +24,14 @@ ENDINGS = (".csv", ".tex", ".md", ".json", ".pdf", ".png")  #: of the files that
 class Study(Said):
     """The outcome of a study; its data are what `airlight study NAME --json` prints."""
 
-    #: A row for each measurement, plain numbers by name: mappings, as each study has columns of its own, which CSV
-    #: files and data frames take by name.
-    rows: tuple[Mapping[str, Any], ...] = ()
+    #: A record for each measurement; a mapping where the columns of a study are no record's.
+    rows: tuple[Any, ...] = ()
     draw: "Callable[[str], Figure] | None" = None  #: returns the figure for a column, 'single' or 'double'
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __iter__(self) -> Iterator[Mapping[str, Any]]:
+    def __iter__(self) -> Iterator[Any]:
         return iter(self.rows)
 
     def __getitem__(self, index: Any) -> Any:
@@ -44,9 +43,15 @@ class Study(Said):
         return f"{self.name}, {len(self.rows)} rows" if self.rows else self.name
 
     def columns(self) -> dict[str, list[Any]]:
-        """Return the rows as columns by name, as `pandas.DataFrame` takes them."""
-        names = dict.fromkeys(name for row in self.rows for name in row)
-        return {name: [row.get(name) for row in self.rows] for name in names}
+        """Return the rows as columns by name, as `pandas.DataFrame` takes them.
+
+        The name of a value in a record within a row is its path, `times.frame.median_ms`.
+        """
+        from validation.columns import shown_values
+
+        rows = [row if isinstance(row, Mapping) else shown_values(row) for row in self.rows]
+        names = dict.fromkeys(name for row in rows for name in row)
+        return {name: [row.get(name) for row in rows] for name in names}
 
     def save(self, path: Path | str, column: str = "double") -> Path:
         """Write the tables (.csv, .tex, .md), the data (.json) or the figure (.pdf, .png); return the path.
@@ -74,7 +79,7 @@ class Study(Said):
 
             return save_figure(target, self.draw, column)
         if target.suffix == ".csv":
-            write_text(target, _rows_csv(self.rows) if self.rows else "\n".join(map(csv, self.tables)))
+            write_text(target, _columns_csv(self.columns()) if self.rows else "\n".join(map(csv, self.tables)))
         elif target.suffix == ".tex":
             write_text(target, "\n".join(latex([table]) for table in self.tables))
         elif target.suffix == ".md":
@@ -86,12 +91,11 @@ class Study(Said):
         return target
 
 
-def _rows_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
     from reports.tables.drawing import csv
     from reports.tables.table import Column, table
 
-    names = dict.fromkeys(name for row in rows for name in row)
-    return csv(table("", [Column(name, name) for name in names], [dict(row) for row in rows]))
+    return csv(table("", [Column(name, name) for name in columns], list(zip(*columns.values()))))
 
 
 def with_environment(**data: Any) -> dict[str, Any]:

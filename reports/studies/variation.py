@@ -246,7 +246,6 @@ def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> S
     """
     from reference.scene.read import read_reference
     from reports.api.scenes import opened
-    from validation.columns import shown_values
     from validation.estimates.transmittance import TransmittanceError, transmittance_errors
 
     with telling(progress, "rays") as tell:
@@ -260,7 +259,7 @@ def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> S
         name="transmittance",
         data=data,
         tables=(drawn,),
-        rows=tuple(map(shown_values, rows)),
+        rows=tuple(rows),
         draw=partial(_draw_transmittance, rows),
     )
 

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import TypeVar
 
 from realtime.methods.shader.source import is_shader
 from reports.data.reader import meanings
@@ -22,6 +23,7 @@ from reports.tables.table import (
 )
 from validation.columns import columns_of
 from validation.metrics.errors import Metrics
+from validation.study.row import Row as CellRow
 from validation.timing import FrameTimes, Timing
 
 #: Times of a frame, by their names in report.json.
@@ -55,6 +57,8 @@ COLUMNS = {
         *numbers(nonfinite="not finite", how={"alarm": True}),
     )
 }
+_Entry = TypeVar("_Entry", MethodRow, CellRow)
+
 TARGETS = (0.01, 0.001)  #: relative RMSE for which the fastest method is named
 #: Columns of what `bench` prints.
 BENCH = (
@@ -103,14 +107,14 @@ def rate_words(milliseconds: float) -> str:
     return f"{digits_of(1000 / milliseconds, COLUMNS['frame_rate'])} frames/s"
 
 
-def fastest_within(error: float, entries: Iterable[MethodRow]) -> tuple[MethodRow, float] | None:
-    """Return the method of the fastest frame [ms] among those with at most a relative RMSE; None where there is none.
+def fastest_within(error: float, entries: Iterable[_Entry]) -> tuple[_Entry, float] | None:
+    """Return the row of the fastest frame [ms] among those with at most a relative RMSE; None where there is none.
 
     Shaders run on another device, and are in no race with others. Pixels that are not finite are left out of the RMSE:
     a method that has any must not win by it.
     """
 
-    def reaches(entry: MethodRow) -> bool:
+    def reaches(entry: _Entry) -> bool:
         if entry.device or entry.error is None or entry.error.relative_rmse is None:
             return False
         return entry.error.relative_rmse <= error and not entry.error.nonfinite

@@ -2,7 +2,6 @@
 """Results of the Python API: frozen, arrays for NumPy, HTML and PNG for a notebook; from made-up numbers, no scene."""
 
 import dataclasses
-from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from reference.storage.exr import Image, read_exr
 from reports.api.compare import compare
 from reports.api.results import Reference, Rendering, sealed
 from reports.studies.methods import MethodsStudy
+from validation.study.row import Row
 
 
 def layered(scale=1.0, dtype=np.float32, **more):
@@ -73,21 +73,11 @@ def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["frame.exr", "frame.png"]
 
 
-def row(label, frame_ms, error, **more):
-    made = {"scene": "fog", "width": 8, "height": 6, "label": label, "frame_ms": frame_ms, "airlight_ms": 1.0}
-    made |= {"frame_low_ms": frame_ms, "frame_high_ms": frame_ms}
-    made |= {"light_moved_ms": 2.0, "relative_rmse": error, "relative_bias": 0.0, "p99": 0.1, "nonfinite": 0}
-    return MappingProxyType(made | {"refused": None, "note": None} | more)
-
-
-def test_the_fastest_row_is_finite_and_within_the_error():
-    refused = row("d", None, None, refused="no <lights>", nonfinite=None)
-    rows = (row("a", 9.0, 1e-4), row("b", 2.0, 1e-4, nonfinite=3), row("c", 1.0, 0.2), refused)
-    benched = MethodsStudy(name="methods", data={}, rows=rows)
-    assert benched.fastest(0.01)["label"] == "a"
-    assert benched.fastest(0.5)["label"] == "c"
-    assert benched.fastest(1e-6) is None
-    assert benched.fastest(0.5, scene="other") is None
-    assert len(benched) == 4
-    assert benched[1]["label"] == "b"
-    assert benched.columns()["label"] == ["a", "b", "c", "d"]
+def test_rows_are_records_and_columns_by_their_paths():
+    rows = [Row("fog", label, "m", None, "{}", 8, 6, "refused", reason="no <lights>") for label in "ab"]
+    benched = MethodsStudy(name="methods", data={}, rows=tuple(rows))
+    assert benched.fastest(0.5) is None
+    assert len(benched) == 2
+    assert benched[1].label == "b"
+    assert benched.columns()["label"] == ["a", "b"]
+    assert benched.columns()["times.frame.median_ms"] == [None, None]

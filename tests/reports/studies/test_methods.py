@@ -41,16 +41,16 @@ def test_python_gives_functions_and_configurations_and_gets_rows(variant):
         progress=lambda fraction, what: told.append(fraction),
     )
     taylor, own = table
-    assert taylor["label"] == "unshadowed (taylor)"
+    assert taylor.label == "unshadowed (taylor)"
     exact = airlight.reference("open-fog", size=TINY).airlight
     # Twice as bright: the error is the reference.
-    assert own["relative_rmse"] == pytest.approx(np.sqrt(np.mean(exact**2)) / exact.mean(), rel=1e-5)
-    assert own["relative_bias"] == pytest.approx(1.0, rel=1e-5)
+    assert own.error.relative_rmse == pytest.approx(np.sqrt(np.mean(exact**2)) / exact.mean(), rel=1e-5)
+    assert own.error.relative_bias == pytest.approx(1.0, rel=1e-5)
     for row in table:
-        assert row["scene"] == "open-fog"
-        assert 0 < row["frame_low_ms"] <= row["frame_ms"] <= row["frame_high_ms"]
-        assert row["refused"] is None
-        assert row["nonfinite"] == row["negative"] == 0
+        assert row.scene == "open-fog"
+        assert 0 < row.times.frame.low_ms <= row.times.frame.median_ms <= row.times.frame.high_ms
+        assert row.reason is None
+        assert row.error.nonfinite == row.error.negative == 0
     columns = table.columns()
     assert set(map(len, columns.values())) == {2}
     assert columns["kernel"] == ["taylor", "exact"]
