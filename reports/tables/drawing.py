@@ -185,7 +185,7 @@ def _meanings(columns: Sequence[Column]) -> list[str]:
     if not explained:
         return []
     terms = "".join(f"<dt>{_in_html(column.title)}</dt><dd>{_in_html(column.meaning)}</dd>" for column in explained)
-    return [f'<details class="terms"><summary>What the columns mean</summary><dl>{terms}</dl></details>']
+    return [f'<details class="terms"><summary>Meaning of the columns</summary><dl>{terms}</dl></details>']
 
 
 def latex(tables: Sequence[Table], *, comment: Sequence[str] = ()) -> str:
