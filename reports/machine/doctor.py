@@ -12,7 +12,7 @@ prints Debian's names of the packages that are missing, for the launcher.
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +43,7 @@ class Kernel:
     threads: int
     library: str | None  #: the libLLVM that was really loaded, where the system tells
     epsilon: float  #: of shadow rays, relative
-    seconds: float
+    seconds: float = 0.0  #: until its process had answered
 
 
 @dataclass(frozen=True)
@@ -219,12 +219,13 @@ def diagnose() -> Machine:
 
 def try_kernel(variant: str) -> Kernel:
     """Run a kernel in a process of its own; raises EndedError or MissingError where it does not work."""
-    return in_own_process(probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant)
+    start = time.perf_counter()
+    kernel = in_own_process(probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant)
+    return replace(kernel, seconds=time.perf_counter() - start)
 
 
 def probe() -> Kernel:
     """Cast a ray at a sphere in the current variant, and check where it meets it."""
-    start = time.perf_counter()
     import drjit as dr
     import mitsuba as mi
 
@@ -235,8 +236,7 @@ def probe() -> Kernel:
     distances = towards.t.numpy().tolist()
     if abs(distances[0] - 1.5) > 1e-5 or distances[1] < 1e30:
         raise MissingError(f"the test kernel is wrong: distances {distances}, wanted 1.5 and infinity")
-    epsilon = measure_shadow_epsilon()
-    return Kernel(mi.variant(), dr.thread_count(), _loaded_llvm(), epsilon, time.perf_counter() - start)
+    return Kernel(mi.variant(), dr.thread_count(), _loaded_llvm(), measure_shadow_epsilon())
 
 
 def _loaded_llvm() -> str | None:
