@@ -88,7 +88,7 @@ class Reference:
     """The accuracy of the quadrature."""
 
     mean: Number = column(unit="W/(m^2 sr)", meaning="of the airlight")
-    relative_bound: Number = column(meaning="of its error")
+    relative_bound: Number = column(meaning="of its error, three standard errors of area lights added")
     transitions: int = column(meaning="edges of lit intervals")
     missed: Number = column(meaning="fraction of the first shadow rays that disagreed")
     checked: int = column(meaning="shadow rays that checked the lit intervals")

@@ -5,6 +5,7 @@ Every result is kept on disk as soon as it is there (`validation.study.scene`): 
 it stopped, and one in which nothing changed measures nothing. The files of a report appear when it is whole.
 """
 
+import gc
 import os
 import shutil
 import sys
@@ -83,24 +84,36 @@ def write_report(
         environment["opengl"] = require_opengl()
     process = in_own_process if apart else None
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
-    with _timed(seconds, "scenes"):
-        studies = [open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine()) for name in names]
-        noted([words for each in studies for words in each.scene.features.notes])
+    since, notes, of_scenes, pictures = time.time() if fresh else None, list[str](), [], []
+
+    def opened(name: str) -> SceneStudy:
+        return open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine())
+
+    with _timed(seconds, "scenes"), fresh_results(since):
+        for name in names:
+            each = opened(name)
+            notes += each.scene.features.notes
+            of_scenes.append(each.seconds())
+            pictures.append(_picture(each, each.size))
+        noted(notes)
     # Not before the scenes are known to be right: a mistake leaves no empty folder.
     target = ensure_folder(folder)
-    with fresh_results(time.time() if fresh else None), staged(target) as hidden:
+    with fresh_results(since), staged(target) as hidden:
         others = other_parts(study)
-        of_scenes = [each.seconds() for each in studies]
-        whole = [sum(each.values()) for each in of_scenes] + [part.seconds for part in others]
-        spans = list(spans_of({str(n): each for n, each in enumerate([*whole, _PAGE_SECONDS * len(studies)])}).values())
+        whole = [sum(parts.values()) for parts in of_scenes] + [part.seconds for part in others]
+        spans = list(spans_of({str(n): each for n, each in enumerate([*whole, _PAGE_SECONDS * len(names)])}).values())
         studied, results = [], list[Kept[Any]]()
         with _timed(seconds, "scenes"):
             if cluster is not None:
                 from reports.cluster.references import bring_references
 
-                bring_references(cluster, [_picture(each, each.size) for each in studies], points=study.points)
-            ended = _try_own(studies[0], process) if studies else {}
-            for each, parts, span in zip(studies, of_scenes, spans):
+                bring_references(cluster, pictures, points=study.points)
+            ended = _try_own(names[0], study, process) if names else {}
+            for name, parts, span in zip(names, of_scenes, spans):
+                # One scene at a time: Mitsuba compiles a virtual call for the materials, media and lights of all scenes
+                # that are loaded. Beside ten others a batch of volpath takes eight times as long.
+                gc.collect()
+                each = opened(name)
                 step = part_of(progress, *span, before=f"{each.name}: ")
                 begins = {part: first for part, (first, _) in spans_of(parts).items()}
                 result = study_scene(
@@ -115,8 +128,10 @@ def write_report(
                 _raise_own_faults(result.rows, process)
                 results += result.results
                 studied.append(write_scene(result, hidden))
+                del each, result
+            gc.collect()
         by_kind: dict[str, list[Any]] = {}
-        for part, span in zip(others, spans[len(studies) :]):
+        for part, span in zip(others, spans[len(names) :]):
             with _timed(seconds, part.kind):
                 found = part.result(part_of(progress, *span, before=f"{part.title}, "))
             by_kind.setdefault(part.kind, []).append(found.value)
@@ -193,16 +208,16 @@ def _picture(study: SceneStudy, size: tuple[int, int]) -> "Picture":
     return Picture(name if name in SCENES or is_random(name) else str(Path(name).resolve()), size)
 
 
-def _try_own(study: SceneStudy, apart: Apart | None) -> dict[Configuration, str]:
+def _try_own(scene: str, study: Study, apart: Apart | None) -> dict[Configuration, str]:
     """Render a small frame with every user method: what is at fault there is said before the work.
 
     Returns those that ended their process, with how: they are not called again.
     """
     ended = {}
-    for chosen in study.study.configurations:
+    for chosen in study.configurations:
         if not chosen.own:
             continue
-        cell = Cell(study.path, PROBE, (), chosen)
+        cell = Cell(scene, PROBE, (), chosen)
         try:
             _ = frame_of(cell) if apart is None else apart(frame_of, cell, name=chosen.method)
         except (InputError, MethodError) as error:

@@ -19,6 +19,7 @@ from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mappe
 from validation.columns import record_of
 from validation.estimates.images import layered_reference
 from validation.scenes.loading import scene_stem
+from validation.study.reference import of_image
 from validation.study.row import Row
 from validation.study.scene import Judged, SceneResult
 
@@ -82,7 +83,7 @@ def reference_record(reference: ReferenceImage) -> Reference:
     finite = np.isfinite(reference.airlight)
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
-    bound = float(reference.airlight_bound[finite].mean()) / mean if mean > 0 else None
+    bound = float(of_image(reference).bound[finite].mean()) / mean if mean > 0 else None
     found = {"mean": mean, "relative_bound": bound} | {name: getattr(reference, name) for name in numbers}
     return record_of(found, Reference)
 

@@ -75,7 +75,8 @@ class Reference:
 
 def of_image(image: ReferenceImage, spent: Spent = _UNKNOWN) -> Reference:
     """Return a quadrature image as the reference of cells."""
-    return Reference(image.airlight, image.airlight_bound, image.surface, None, image.transitions, spent)
+    drawn = 0.0 if image.airlight_se is None else _STANDARD_ERRORS * image.airlight_se
+    return Reference(image.airlight, image.airlight_bound + drawn, image.surface, None, image.transitions, spent)
 
 
 def load_cell(cell: Cell) -> LoadedScene:
