@@ -273,8 +273,8 @@ def _segment(change: Callable[..., Any]) -> Wrap:
 
 
 def _one_technique(function, u, mixture):
-    y, s, _ = function(u, mixture)
-    return y, s, mixture_pdfs(y, mixture)[0]
+    y, _ = function(u, mixture)
+    return y, mixture_pdfs(y, mixture)[0]
 
 
 def _equal_cells(function, number, shift, count):
@@ -504,10 +504,10 @@ _TRACED_WIDE = _all(
     "wide-lights",
     {
         "traced-area-without-cosine": Rewrite(
-            _SOURCES, "self.light.radiance * (cosine_ / density_)", "self.light.radiance * (1 / density_)"
+            _SOURCES, "self.radiance * (cosine_ / density_)", "self.radiance * (1 / density_)"
         ),
         "traced-area-even-density": Rewrite(
-            _TRACED, "dr.select(counts_, density, 0)", "dr.select(counts_, 1 / light.area, 0)"
+            _TRACED, "dr.select(counts_, density, 0)", "dr.select(counts_, 1 / self.area, 0)", times=2
         ),
         "traced-area-chord-density": Rewrite(
             _TRACED, "0.5 * share_ / (4 * math.pi * radius_ * chord_)", "share_ / (4 * math.pi * radius_ * chord_)"
@@ -516,8 +516,7 @@ _TRACED_WIDE = _all(
             _TRACED, "(1 - share_) * (1 + dr.dot(n_, side_)) / area_", "(1 - share_) / area_"
         ),
         "traced-area-projected-sphere": Wrap(
-            f"{_TRACED}.area_sampling:AreaLight.area",
-            lambda function, light: function(light) / (4 if light.shape == "Sphere" else 1),
+            f"{_TRACED}.area_sampling:Ball.area", lambda function, light: function(light) / 4
         ),
         "traced-area-bright-camera-segment": _BRIGHT_CAMERA_SEGMENT,
         "traced-area-forward-is-backward": _TRACED_BACKWARD,

@@ -19,8 +19,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from analytic.errors import InputError
-
 _SHORT_OF_POINT = 1e-5  # relative: a hundred roundings of single precision
 _BEYOND = 2e-6  # of the largest coordinate: how far beyond a boundary a ray goes on; thinner media are not seen
 
@@ -29,7 +27,7 @@ _BEYOND = 2e-6  # of the largest coordinate: how far beyond a boundary a ray goe
 class Surroundings:
     """The shapes that rays can meet."""
 
-    scene: Any  #: the `mi.Scene`
+    scene: Any  #: an `mi.Scene`; of opaque shapes alone where nothing bounds a medium
     surfaces: bool  #: there are shapes
     bounded: bool  #: some of them are boundaries of media
 
@@ -40,51 +38,6 @@ class Segment:
 
     start: Any  #: pointer to the medium at the light; what is beyond, the boundaries say
     end_sigma_t: Any  #: extinction at the points [1/m], that of the whole segment where nothing bounds a medium
-
-
-def read_surroundings(scene) -> tuple[Surroundings, list[Any]]:
-    """Read what rays can meet in a Mitsuba scene, and the media behind its boundaries.
-
-    Raises InputError for a heterogeneous medium, a material that is transparent in part, or a medium behind an opaque
-    material.
-    """
-    bounded = False
-    everywhere: list[Any] = []
-    for shape in scene.shapes():
-        see_through = _is_null(shape)
-        media = [medium for medium in (shape.interior_medium(), shape.exterior_medium()) if medium is not None]
-        for medium in media:
-            require_homogeneous(medium)
-        if media and not see_through:
-            raise InputError(
-                f"single-scatter: shape '{shape.id()}' bounds a medium with a material that stops or bends light; "
-                "wanted a bsdf of type 'null' there"
-            )
-        bounded |= see_through
-        everywhere += media
-    return Surroundings(scene, bool(scene.shapes()), bounded), everywhere
-
-
-def _is_null(shape) -> bool:
-    flags = int(shape.bsdf().flags())
-    null = bool(flags & int(mi.BSDFFlags.Null))
-    if null and flags & int(mi.BSDFFlags.All) & ~int(mi.BSDFFlags.Null):
-        raise InputError(
-            f"single-scatter: shape '{shape.id()}' has a material that is transparent in part; "
-            "wanted an opaque one or 'null'"
-        )
-    return null
-
-
-def require_homogeneous(medium) -> None:
-    """Refuse a medium that is not homogeneous.
-
-    Raises InputError for such a medium.
-    """
-    if not medium.is_homogeneous():
-        raise InputError(f"single-scatter: got a {medium.class_name()}; wanted media of type 'homogeneous'")
-    if "albedo.value.value" not in mi.traverse(medium):
-        raise InputError(f"single-scatter: the albedo of medium '{medium.id()}' differs from place to place")
 
 
 def coefficients(medium, active) -> tuple[Any, Any]:
@@ -130,19 +83,23 @@ def medium_at(around: Surroundings, position, known_position, known_medium, acti
     return dr.while_loop(state, lambda walking, *_: walking, walk, label="medium at a light")[-1]
 
 
+def unblocked(around: Surroundings, start, direction, distance, active):
+    """Return where nothing stands between the start of shadow rays and a little before their ends."""
+    if not around.surfaces:
+        return mi.Bool(True)
+    return ~around.scene.ray_test(mi.Ray3f(start, direction, distance * (1 - _SHORT_OF_POINT), 0.0, []), active)
+
+
 def transmittance(around: Surroundings, start, direction, distance, *, media: Segment, active):
     """Return the transmittance from a light to points at a distance; 0 where something is in between.
 
     `around`: what rays can meet; `start`, `direction`, `distance`: the light, the unit vector to the point, and how far
     it is [m]; `media`: the media at both ends; `active`: mask.
     """
-    reach = distance * (1 - _SHORT_OF_POINT)
     if not around.bounded:
-        whole = dr.exp(-media.end_sigma_t * distance)
-        if not around.surfaces:
-            return whole
-        blocked = around.scene.ray_test(mi.Ray3f(start, direction, reach, 0.0, []), active)
-        return dr.select(blocked, 0, whole)
+        lit = unblocked(around, start, direction, distance, active)
+        return dr.select(lit, dr.exp(-media.end_sigma_t * distance), 0)
+    reach = distance * (1 - _SHORT_OF_POINT)
 
     def walk(walking, lit, done, boundary, medium, depth):
         """Go to the next thing on the way, `done` being where the ray starts, `boundary` the last change of medium."""

@@ -218,14 +218,14 @@ def _terms(y, mixture: Mixture) -> list[tuple[Any, Any]]:
     return [equi, (fraction * sum(cdf for cdf, _ in flights), fraction * sum(pdf for _, pdf in flights))]
 
 
-def sample_distance(u, mixture: Mixture) -> tuple[Any, Any, Any]:
+def sample_distance(u, mixture: Mixture) -> tuple[Any, Any]:
     """Sample a distance from the mixture of both techniques by inverting its cumulative distribution.
 
-    `u`: uniform in [0, 1); `mixture`: see `mixture_of`. Returns the distances from the start of the span and from the
-    foot [m], and the density [1/m].
+    `u`: uniform in [0, 1); `mixture`: see `mixture_of`. Returns the distances from the start of the span [m] and the
+    density [1/m].
 
     The distance grows with u, so that a regular grid of u, jittered, stratifies the distance. (Were u to choose the
-    technique, a lamp's peak would fall into few cells of the free flights: 50 times the variance at 64 samples.)
+    technique, a point light's peak would fall into few cells of the free flights: 50 times the variance at 64 samples.)
 
     The mean of several cumulative distributions takes the value u between the places where they themselves do. Between
     those, Newton's method in the angle delta, with d(y)/d(delta) = r^2/h, and a bisection where it leaves the bracket.
@@ -253,7 +253,7 @@ def sample_distance(u, mixture: Mixture) -> tuple[Any, Any, Any]:
     state = (mi.UInt32(0), dr.full(mi.Bool, True, dr.width(low)), low, high, 0.5 * (low + high))
     angle = dr.while_loop(state, lambda number, searching, *_: searching, improve, label="inverse of the mixture")[-1]
     y = _distance(angle, span)
-    return y, span.start + y, sum(mixture_pdfs(y, mixture))
+    return y, sum(mixture_pdfs(y, mixture))
 
 
 def sample_stretch(u, length, sigma_t: Sequence[Any]) -> tuple[Any, Any]:

@@ -16,38 +16,46 @@ In a scene whose extinction depends on the channel all channels use the same dis
 over the channels, so that no channel's variance can become infinite.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from reference.monte_carlo.single_scatter.boundary_walk import coefficients, is_boundary, medium_at, step_beyond
-from reference.monte_carlo.single_scatter.density_grid import grid_part
-from reference.monte_carlo.single_scatter.height_fog import height_fog_part
-from reference.monte_carlo.single_scatter.scene_data import Task
+from reference.monte_carlo.single_scatter.boundary_walk import (
+    Surroundings,
+    coefficients,
+    is_boundary,
+    medium_at,
+    step_beyond,
+)
 from reference.monte_carlo.single_scatter.sources import Source
 from reference.monte_carlo.single_scatter.stretches import Part, Ray, Stretch, cell_of, place_of
+from reference.monte_carlo.single_scatter.varying_media import varying_part
+from reference.scene.varying import VaryingMedium
 
 
-def ray_light(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
+@dataclass(frozen=True)
+class Task:
+    """The constants of a scene while it is traced."""
+
+    around: Surroundings  #: what rays can meet
+    sources: tuple[Source, ...]  #: the lights
+    samples: int  #: distances for each ray, light and medium
+    grey: bool  #: no medium's extinction depends on the channel
+    start: Any  #: pointer to the medium in which camera rays start
+    varying: VaryingMedium | None = None  #: the same, where its extinction differs from place to place
+
+
+def ray_light(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
     """Return airlight and lit surface along camera rays [W/(m^2 sr)].
 
-    `task`: see `reference.monte_carlo.single_scatter.scene_data`; `sampler`: Mitsuba's sampler, with one stream for
-    each ray; `ray`: the rays; `medium`: what the rays start in: a Mitsuba medium, a pointer to one, or None for a
-    vacuum; `active`: mask.
+    `task`: what is traced; `sampler`: Mitsuba's sampler, with one stream for each ray; `ray`: the rays; `active`: mask.
     """
-    if medium is None:
-        medium = dr.zeros(mi.MediumPtr)
-    elif isinstance(medium, mi.Medium):
-        medium = mi.MediumPtr(medium)
-    if task.fog is None and not task.majorant:
-        return _through_media(task, sampler, ray, medium, active)
+    if task.varying is None:
+        return _through_media(task, sampler, ray, active)
     hit = _next_hit(task, ray, mi.Float(0), active)
-    if task.fog is not None:
-        part: Part = height_fog_part(task.fog, task.around, ray, medium, hit.t)
-    else:
-        part = grid_part(task.majorant, task.around, ray, medium, hit.t)
+    part = varying_part(task.varying, task.around, ray, hit.t)
     airlight, sampler = _airlight(task, sampler, ray, part, active)
     surface, _ = _surface(task, sampler, ray, hit, hit.t, part, active & hit.is_valid())
     return airlight, surface
@@ -60,7 +68,7 @@ def _next_hit(task: Task, ray: Ray, done, active):
     return task.around.scene.ray_intersect(mi.Ray3f(ray.origin + ray.direction * done, ray.direction), active)
 
 
-def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, Any]:
+def _through_media(task: Task, sampler, ray: Ray, active) -> tuple[Any, Any]:
     """Follow camera rays from boundary to boundary, and add up what each stretch sends."""
 
     def walk(walking, sampler, done, start, depth, medium, airlight, surface):
@@ -82,7 +90,7 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
         start = dr.select(passed, end, start)
         return passed, sampler, done, start, depth, medium, airlight + sent, surface + left
 
-    at_camera, known = medium, task
+    at_camera, known = task.start, task
     width = dr.width(active)
     state = (
         mi.Bool(active),
@@ -90,7 +98,7 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
         dr.zeros(mi.Float, width),
         dr.zeros(mi.Float, width),
         dr.zeros(mi.Spectrum, width),
-        dr.select(active, medium, dr.zeros(mi.MediumPtr)) if task.around.bounded else medium,
+        dr.select(active, at_camera, dr.zeros(mi.MediumPtr)) if task.around.bounded else at_camera,
         dr.zeros(mi.Spectrum, width),
         dr.zeros(mi.Spectrum, width),
     )
@@ -98,7 +106,7 @@ def _through_media(task: Task, sampler, ray: Ray, medium, active) -> tuple[Any, 
         return walk(*state)[-2:]
     # The medium at a light that stays is looked for once.
     places = (
-        replace(each, medium=medium_at(task.around, mi.Point3f(each.position), ray.origin, medium, active))
+        replace(each, medium=medium_at(task.around, mi.Point3f(each.position), ray.origin, at_camera, active))
         if each.position is not None
         else each
         for each in task.sources

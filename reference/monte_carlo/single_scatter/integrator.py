@@ -19,10 +19,12 @@ import mitsuba as mi
 import numpy as np
 
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
-from reference.monte_carlo.single_scatter.estimator import ray_light
-from reference.monte_carlo.single_scatter.scene_data import read_task
+from reference.monte_carlo.single_scatter.boundary_walk import Surroundings
+from reference.monte_carlo.single_scatter.estimator import Task, ray_light
+from reference.monte_carlo.single_scatter.sources import sources_of
 from reference.monte_carlo.single_scatter.stretches import double_ray
-from reference.scene.read import ReferenceScene, whole_scene
+from reference.scene.read import ReferenceScene
+from reference.scene.varying import VaryingMedium
 
 _RAYS = 1 << 20  # camera rays in one kernel
 
@@ -36,8 +38,7 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
     alone: without these all batches agree on it.
     """
     check_samples(samples)
-    medium = reference.scene.sensors()[0].get_medium()
-    task = read_task(whole_scene(reference), medium, samples)
+    task = _task(reference, samples)
     sampler = mi.load_dict({"type": "independent"})
     pixels = reference.width * reference.height
     chunks = -(-pixels // _RAYS)
@@ -48,8 +49,24 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
         # Seeds count up from batch to batch and from chunk to chunk: no two streams share one.
         sampler.seed((seed * chunks + number) % 2**32, count)
         ray = double_ray(mi.Point3d(*(float(c) for c in reference.origin)), mi.Vector3d(reference.direction[chunk].T))
-        layers = ray_light(task, sampler, ray, medium, dr.full(mi.Bool, True, count))
+        layers = ray_light(task, sampler, ray, dr.full(mi.Bool, True, count))
         dr.eval(layers)
         for layer, radiance in enumerate(layers):
             mean[layer, chunk] = np.stack([np.array(c, dtype=np.float64) for c in radiance], axis=1)
     return single_batch(seed, samples, mean)
+
+
+def _task(reference: ReferenceScene, samples: int) -> Task:
+    """Return what is traced, of a scene that was read."""
+    bounded, media = bool(reference.media), (reference.medium, *reference.media)
+    # Shapes of material `null` that bound no homogeneous medium, lights among them, take no part.
+    scene = reference.scene if bounded else reference.occluders
+    camera = reference.scene.sensors()[0].get_medium()
+    return Task(
+        Surroundings(scene, bool(scene.shapes()), bounded),
+        sources_of(reference),
+        samples,
+        grey=all(len(set(medium.largest.tolist())) == 1 for medium in media),
+        start=dr.zeros(mi.MediumPtr) if camera is None else mi.MediumPtr(camera),
+        varying=reference.medium if isinstance(reference.medium, VaryingMedium) else None,
+    )

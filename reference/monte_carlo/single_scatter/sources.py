@@ -5,8 +5,8 @@ A light at a place sends the intensity I to a point at the distance r; a sample 
 density of the distances along the ray (`reference.monte_carlo.single_scatter.stretches.Part`). An area light has a
 point y for each sample, which is such a light: its intensity is Le max(0, n . w) over the density of y, w the unit
 vector from y. The plane of y clips the ray: points behind it get no light from y. A sun and a sky have an irradiance,
-and a sky has a direction for each sample. Mitsuba's emitters compute the emission, except for area lights, which are
-read again (`reference.monte_carlo.single_scatter.area_sampling`): Mitsuba's `sample_direction` is not used for these.
+and a sky has a direction for each sample. Mitsuba's emitters compute the emission, except for area lights, whose
+points are drawn by `reference.monte_carlo.single_scatter.area_sampling`, not by Mitsuba's `sample_direction`.
 """
 
 import math
@@ -18,18 +18,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from reference.monte_carlo.single_scatter.area_sampling import (
-    AreaLight,
-    LightSample,
-    is_area,
-    read_area,
-    sample_evenly,
-    sample_point,
-)
+from reference.monte_carlo.single_scatter.area_sampling import Emitting, LightSample, emitting
 from reference.monte_carlo.single_scatter.boundary_walk import step_beyond
 from reference.monte_carlo.single_scatter.distance_sampling import Approach, Span, closest_approach, cone_ends
 from reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
+from reference.scene.area_light import is_area
+from reference.scene.directional_light import is_directional
+from reference.scene.read import ReferenceScene, whole_scene
 
 _FARTHEST = 1e15  # of places that light is scattered at [m]: squares of longer ways overflow in single precision
 _LEAST_SLOPE = 1e-12  # of a ray against the plane of a light's point
@@ -134,21 +129,22 @@ class PointSource(_Near):
 class AreaSource(_Near):
     """An area light."""
 
-    light: AreaLight
+    shape: Emitting
+    radiance: Any  #: RGB [W/(m^2 sr)]
     varies = True
 
     def point(self, numbers, ray: Ray | None) -> LightSample:
         """Return points that are spread towards rays, or evenly over the area."""
         u, v = numbers
         if ray is None:
-            return sample_evenly(u, v, self.light)
-        return sample_point(u, v, self.light, origin=ray.origin_double, direction=ray.direction_double)
+            return self.shape.evenly(u, v)
+        return self.shape.towards(u, v, ray.origin_double, ray.direction_double)
 
     def sent(self, point: LightSample, at, from_light) -> Any:
         """Return the intensity of points."""
         cosine = dr.maximum(dr.dot(mi.Vector3f(point.normal), from_light), 0)
         density = dr.select(point.density > 0, point.density, 1)
-        return self.light.radiance * (cosine / mi.Float(density))
+        return self.radiance * (cosine / mi.Float(density))
 
     def ends(self, point: LightSample, approach: Approach, ray: Ray) -> tuple[Any, Any]:
         """Return the ends of the part of a line before the plane of each point."""
@@ -202,21 +198,19 @@ def is_sky(emitter) -> bool:
     return bool(emitter.class_name() == "ConstantBackgroundEmitter")
 
 
-def read_source(emitter) -> Source:
-    """Read a light of a Mitsuba scene. Raises InputError for one of another kind."""
-    name = emitter.class_name()
-    if is_sky(emitter) or name == "DirectionalEmitter":
+def sources_of(reference: ReferenceScene) -> tuple[Source, ...]:
+    """Return the lights of a scene."""
+    emitters = [emitter for emitter in whole_scene(reference).emitters() if not is_area(emitter)]
+    wide = [AreaSource(emitting(light), mi.Color3f(*map(float, light.radiance))) for light in reference.area]
+    return (*map(_source, emitters), *wide)
+
+
+def _source(emitter) -> Source:
+    if is_sky(emitter) or is_directional(emitter):
         return FarSource(emitter)
-    if is_area(emitter):
-        return AreaSource(read_area(emitter))
-    if name not in ("PointLight", "SpotLight"):
-        raise InputError(
-            f"single-scatter: the scene has an emitter of class {name}; wanted 'point', 'spot', 'directional', "
-            "'area' or 'constant' only"
-        )
     sample, _ = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
     position = mi.Point3d(sample.p)
-    if name == "PointLight":
+    if emitter.class_name() == "PointLight":
         return PointSource(emitter, position)
     axis = dr.normalize(mi.Vector3d(emitter.world_transform() @ mi.Vector3f(0, 0, 1)))
     cutoff = float(np.ravel(mi.traverse(emitter)["cutoff_angle"])[0])

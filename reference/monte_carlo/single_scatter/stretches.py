@@ -88,8 +88,7 @@ class Stretch(Part):
         """Sample distances by the mixture of techniques; see `Part`."""
         if span is None:
             return sample_stretch(u, length, self.rates)
-        y, _, density = sample_distance(u, mixture_of(span, self.rates))
-        return y, density
+        return sample_distance(u, mixture_of(span, self.rates))
 
     def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
         """Return the transmittance of both ways; see `Part`."""
@@ -107,12 +106,6 @@ def double_ray(origin, direction) -> Ray:
     """Return rays given in double precision; their directions need not have unit length."""
     direction = dr.normalize(direction)
     return Ray(mi.Point3f(origin), dr.normalize(mi.Vector3f(direction)), origin, direction)
-
-
-def lit(around: Surroundings, path: Path, active):
-    """Return 1 where nothing stands in paths, 0 elsewhere."""
-    nothing = Segment(dr.zeros(mi.MediumPtr), dr.zeros(mi.Spectrum, dr.width(active)))
-    return transmittance(around, *path.shadow_ray(), media=nothing, active=active)
 
 
 def cell_of(number, shift, count: int) -> tuple[Any, Any]:

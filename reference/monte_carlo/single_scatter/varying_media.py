@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Camera rays in media whose extinction differs from place to place: height fog and density grids.
+
+**Height fog.** Mitsuba's plugin says the density, antiderivatives the optical depths. With an antiderivative G of the
+density over the height, constant beyond floor and cap, the optical depth of a segment of length l between two heights
+is l (G(z_1) - G(z_0))/(z_1 - z_0), and up to a sun at the height mu it is (G(cap) - G(z))/mu. A sky shines from below
+too: then it is (G(z) - G(floor))/|mu|. For a layer
+
+    G(z) = -sigma_i H_i exp(-(z - z_i)/H_i),     clamped below z_i:  sigma_i (z - z_i - H_i).
+
+Where the heights are as good as one, the depth is the density between them times l. (The quadrature takes the lower end
+and (1 - e^-u)/u.) A free flight has the density sigma exp(-tau)/(1 - exp(-tau_end)): tau is inverted by bisection.
+Under a sun every distance is one: the estimate is the transmittance of its path, and bounded. Under a light at a place
+one half of the samples are equi-angular (`reference.monte_carlo.single_scatter.distance_sampling`).
+
+**Density grids.** Transmittances are unbiased estimates by ratio tracking with Mitsuba's own majorant m (Novak, Selle,
+Jarosz 2014): the product of 1 - sigma_t/m over the points of a Poisson process of the density m. No cell of the grid
+and no optical depth is known here. Distances are equi-angular about lights at places and even under suns and skies,
+between the ends of the box. Integrands are bounded: over the angle at a place sigma_t T_1 T_2 p height, under a sun
+sigma_t T_1 T_2 p.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from reference.monte_carlo.single_scatter.boundary_walk import Surroundings, unblocked
+from reference.monte_carlo.single_scatter.distance_sampling import Span, equi_angular, equi_angular_pdf
+from reference.monte_carlo.single_scatter.stretches import Part, Path, Ray
+from reference.scene.height_fog import HeightMedium
+from reference.scene.varying import VaryingMedium
+
+_LEVEL = 1e-5  # scale heights between two heights that are as good as one
+_FARTHEST = 1e6  # of level rays [m]
+_BISECTIONS = 48
+
+
+def varying_part(medium: VaryingMedium, around: Surroundings, ray: Ray, distance) -> Part:
+    """Return the part of camera rays in a medium, up to the surface at a distance [m]."""
+    plugin = mi.MediumPtr(medium.plugin)
+    if isinstance(medium, HeightMedium):
+        up = mi.Vector3d(*(float(each) for each in medium.up))
+        height, rise = dr.dot(ray.origin_double, up), dr.dot(ray.direction_double, up)
+        ends = [(z - height) / rise for z in (medium.floor, medium.cap)]
+        level, inside = rise == 0, (height >= medium.floor) & (height <= medium.cap)
+        first = dr.select(level, 0, dr.maximum(dr.minimum(*ends), 0))
+        last = dr.select(level, dr.select(inside, _FARTHEST, 0), dr.clip(dr.maximum(*ends), 0, _FARTHEST))
+        last = dr.minimum(last, mi.Float64(distance))
+        return _FogPart(around, first, last, plugin, last > first, medium, up, height, rise)
+    meets, near, far = plugin.intersect_aabb(mi.Ray3f(ray.origin, ray.direction))
+    start, end = mi.Float64(dr.maximum(near, 0)), mi.Float64(dr.minimum(far, distance))
+    majorant = float(dr.max(medium.plugin.get_majorant(dr.zeros(mi.MediumInteraction3f)))[0])
+    return _GridPart(around, start, end, plugin, meets & (end > start), majorant)
+
+
+@dataclass(frozen=True)
+class _FogPart(Part):
+    """Camera rays in height fog."""
+
+    fog: HeightMedium
+    up: Any
+    height: Any  # of the camera [m]
+    rise: Any  # vertical component of the directions
+
+    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
+        """Sample free flights, for a light at a place half of the distances by the angle at it; see `Part`."""
+        u = mi.Float64(u)
+        before = self._depth_to(low)
+        whole = 1 - dr.exp(before - self._depth_to(low + length))
+        own = u if span is None else dr.select(u < 0.5, 2 * u, 2 * u - 1)
+        wanted = before - dr.log(1 - own * whole)
+
+        def halve(number, below, above):
+            middle = 0.5 * (below + above)
+            short = self._depth_to(middle) < wanted
+            return number + 1, dr.select(short, middle, below), dr.select(short, above, middle)
+
+        state = (mi.UInt32(0), mi.Float64(low), mi.Float64(low + length))
+        found = dr.while_loop(state, lambda number, *_: number < _BISECTIONS, halve, label="inverse of the depth")
+        y = 0.5 * (found[1] + found[2]) - low
+        if span is not None:
+            y = dr.select(u < 0.5, equi_angular(own, span), y)
+        x = low + y
+        kept = dr.exp(before - self._depth_to(x))
+        flights = dr.select(whole > 0, self._density(self.height + self.rise * x) * kept / whole, 0)
+        return y, flights if span is None else 0.5 * (flights + equi_angular_pdf(y, span))
+
+    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
+        """Return the transmittance of both ways; see `Part`."""
+        z = dr.dot(mi.Vector3d(point.p), self.up)
+        if path.end is None:
+            depth = self._depth(z, dr.dot(mi.Vector3d(path.begin), self.up), mi.Float64(path.length))
+        else:
+            depth = self._depth_beyond(z, dr.dot(mi.Vector3d(-path.away), self.up))
+        left = mi.Spectrum(mi.Float(dr.exp(-self._depth_to(x) - depth)))
+        return dr.select(unblocked(self.around, *path.shadow_ray(), active), left, 0), sampler
+
+    def _depth_to(self, x):
+        """Return the optical depth from the camera to distances x [m]."""
+        return self._depth(self.height, self.height + self.rise * x, x)
+
+    def _depth(self, z0, z1, length):
+        """Return optical depths between two heights, a length apart [m]."""
+        fog = self.fog
+        least = min((scale for _, _, scale in fog.layers), default=1.0)
+        level = dr.abs(z1 - z0) < _LEVEL * least
+        rise = dr.select(level, 1, z1 - z0)
+        middle = 0.5 * (z0 + z1)
+        inside = (middle >= fog.floor) & (middle <= fog.cap)
+        there = dr.select(inside, length * self._density(middle), 0)
+        return dr.select(level, there, length * (self._antiderivative(z1) - self._antiderivative(z0)) / rise)
+
+    def _depth_beyond(self, z, rise):
+        """Return the optical depth from heights [m] out of the fog; `rise`: vertical, of unit directions."""
+        there = self._antiderivative(z)
+        above, below = (self._antiderivative(mi.Float64(end)) for end in (self.fog.cap, self.fog.floor))
+        return dr.select(rise > 0, above - there, there - below) / dr.maximum(dr.abs(rise), 1e-30)
+
+    def _antiderivative(self, z):
+        """Return G at heights [m]."""
+        z = dr.clip(z, self.fog.floor, self.fog.cap)
+        total = self.fog.constant * z
+        for sigma_t, base, scale in self.fog.layers:
+            over = z - base
+            fallen = -scale * dr.exp(-(dr.maximum(over, 0) if self.fog.clamped else over) / scale)
+            total += sigma_t * (dr.select(over < 0, over - scale, fallen) if self.fog.clamped else fallen)
+        return total
+
+    def _density(self, z):
+        """Return the extinction at heights between floor and cap [1/m]."""
+        total = mi.Float64(self.fog.constant)
+        for sigma_t, base, scale in self.fog.layers:
+            over = z - base
+            total += sigma_t * dr.exp(-(dr.maximum(over, 0) if self.fog.clamped else over) / scale)
+        return total
+
+
+@dataclass(frozen=True)
+class _GridPart(Part):
+    """Camera rays in the box of a grid."""
+
+    majorant: float
+    estimated = True
+
+    def distances(self, u, low, length, span: Span | None) -> tuple[Any, Any]:
+        """Sample distances by the angle at a light, or evenly; see `Part`."""
+        u = mi.Float64(u)
+        if span is None:
+            return u * length, 1 / length
+        y = equi_angular(u, span)
+        return y, equi_angular_pdf(y, span)
+
+    def kept(self, x, point, path: Path, ray: Ray, sampler, active) -> tuple[Any, Any]:
+        """Return estimates of the transmittance of both ways; see `Part`."""
+        camera, sampler = self._tracked((ray.origin, ray.direction, mi.Float(x)), sampler, active)
+        light, sampler = self._tracked(path.shadow_ray(), sampler, active)
+        return dr.select(unblocked(self.around, *path.shadow_ray(), active), mi.Spectrum(camera * light), 0), sampler
+
+    def _tracked(self, line: tuple[Any, Any, Any], sampler, active) -> tuple[Any, Any]:
+        """Return estimates of the transmittance along lines: origin, direction, length [m]; and the sampler."""
+        origin, direction, distance = line
+        meets, near, far = self.medium.intersect_aabb(mi.Ray3f(origin, direction))
+        begin, end = dr.maximum(near, 0), dr.minimum(far, distance)
+
+        def fly(x, kept, sampler):
+            x = x - dr.log(1 - sampler.next_1d()) / self.majorant
+            place = dr.zeros(mi.MediumInteraction3f)
+            place.p = origin + direction * x
+            _, _, sigma_t = self.medium.get_scattering_coefficients(place, x < end)
+            return x, dr.select(x < end, kept * (1 - sigma_t[0] / self.majorant), kept), sampler
+
+        start = dr.select(active & meets, begin, dr.inf)
+        state = start, dr.full(mi.Float, 1, dr.width(start)), sampler
+        _, kept, sampler = dr.while_loop(state, lambda x, *_: x < end, fly, label="ratio tracking")
+        return kept, sampler
