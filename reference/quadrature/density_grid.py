@@ -19,8 +19,8 @@ from reference.quadrature.adaptive_panels import sum_pieces
 from reference.quadrature.cell_walk import CellWalk, cell_walk
 from reference.quadrature.pieces import Kinks, Pieces, cut, whole
 from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest
-from reference.scene.density_grid import GridMedium
 from reference.scene.device import on_device, vectors
+from reference.scene.varying import GridMedium
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]

@@ -17,9 +17,8 @@ from reference.quadrature.density_grid import GridField
 from reference.quadrature.height_fog import HeightField
 from reference.quadrature.homogeneous import HomogeneousField
 from reference.quadrature.stretches import TERMS, Stretches, Terms
-from reference.scene.density_grid import GridMedium
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceScene
+from reference.scene.varying import GridMedium, HeightMedium
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]

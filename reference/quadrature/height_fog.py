@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
 from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest, sums_of
-from reference.scene.height_fog import HeightMedium
+from reference.scene.varying import HeightMedium
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]

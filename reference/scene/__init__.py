@@ -10,11 +10,8 @@ Read in this order:
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;
 - `area_light.py`: area lights, read and checked;
-- `varying.py`: what media of varying extinction have in common;
-- `height_fog.py`: media whose density depends on height;
-- `density_grid.py`: media whose density is a grid;
+- `varying.py`: media whose extinction differs from place to place: height fog and density grids;
 - `read.py`: the whole scene: lights, media, camera rays;
-- `cloud_density.py`: clouds whose density differs from place to place;
 - `clouds.py`: scenes of clouds: media of any shape, suns and a sky;
 - `shapes.py`: opaque shapes as triangles and spheres;
 - `shadow_epsilon.py`: how far short of the light Mitsuba's shadow rays end.

@@ -26,22 +26,6 @@ def is_directional(emitter) -> bool:
     return bool(emitter.class_name() == "DirectionalEmitter")
 
 
-def unbounded_medium(emitter) -> str:
-    """Return why a directional light is refused in a medium without bounds."""
-    return (
-        f"light '{emitter.id()}' is directional: nothing of it arrives through a medium without bounds; give the "
-        "medium bounds, a closed convex shape of material 'null' with the medium as its interior"
-    )
-
-
-def sun_below(emitter) -> str:
-    """Return why a directional light at or below the horizon is refused in height fog."""
-    return (
-        f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths through "
-        "height fog, which has no sides, is infinitely deep; wanted a light from above the horizon"
-    )
-
-
 def read_directional(emitter) -> DirectionalLight:
     """Read a directional emitter: its direction from the transform, its irradiance by asking at a point."""
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)

@@ -19,16 +19,17 @@ from analytic.phase import PhaseFunction
 from reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
-from reference.scene.density_grid import GridMedium, is_grid, read_grid
-from reference.scene.directional_light import (
-    DirectionalLight,
-    is_directional,
-    read_directional,
-    sun_below,
-    unbounded_medium,
+from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
+from reference.scene.varying import (
+    NO_EXTINCTION,
+    GridMedium,
+    HeightMedium,
+    VaryingMedium,
+    is_grid,
+    is_height_fog,
+    read_grid,
+    read_height_fog,
 )
-from reference.scene.height_fog import HeightMedium, is_height_fog, read_height_fog
-from reference.scene.varying import NO_EXTINCTION, VaryingMedium
 
 Array = NDArray[np.float64]
 
@@ -133,14 +134,23 @@ def read_reference(scene) -> ReferenceScene:
     suns = tuple(read_directional(emitter) for emitter in far)
     for emitter, sun in zip(far, suns, strict=True):
         if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
-            raise InputError(unbounded_medium(emitter))
+            raise InputError(
+                f"light '{emitter.id()}' is directional: nothing of it arrives through a medium without bounds; give "
+                "the medium bounds, a closed convex shape of material 'null' with the medium as its interior"
+            )
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
-            raise InputError(sun_below(emitter))
+            raise InputError(
+                f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths "
+                "through height fog, which has no sides, is infinitely deep; wanted a light from above the horizon"
+            )
     sky = _sky(background, medium)
     if not far + near + wide and sky is None:
-        raise InputError(sky_too_far(background))
+        raise InputError(
+            f"light '{background.id()}' is a sky: nothing of it arrives through a medium without bounds; give the "
+            "medium bounds, or add a light"
+        )
     return ReferenceScene(
-        scene=scene if background is None else _without(scene, background),
+        scene=scene if background is None else _rebuilt(scene, emitters),
         occluders=scene_of(opaque, scene),
         width=width,
         height=height,
@@ -184,19 +194,6 @@ def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
     return _rgb(background.eval(dr.zeros(mi.SurfaceInteraction3f)))
 
 
-def sky_too_far(background) -> str:
-    """Return why a sky alone is refused in an unbounded medium."""
-    return (
-        f"light '{background.id()}' is a sky: nothing of it arrives through a medium without bounds; "
-        "give the medium bounds, or add a light"
-    )
-
-
-def _without(scene, background):
-    """Return a scene without its background; all parts keep their names."""
-    return _rebuilt(scene, [each for each in scene.emitters() if each != background])
-
-
 def whole_scene(reference: ReferenceScene):
     """Return Mitsuba's scene with the sky, if it has one."""
     if reference.sky is None:
@@ -205,6 +202,7 @@ def whole_scene(reference: ReferenceScene):
 
 
 def _rebuilt(scene, emitters: list[Any]):
+    """Return a scene with these emitters; all parts keep their names."""
     parts = [*scene.sensors(), *(each for each in emitters if not is_area(each)), *scene.shapes()]
     names = [part.id() for part in parts]
     built = mi.load_dict({"type": "scene"} | {f"part{number}": part for number, part in enumerate(parts)})

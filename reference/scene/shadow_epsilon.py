@@ -13,16 +13,9 @@ import numpy as np
 
 
 def measure_shadow_epsilon() -> float:
-    r"""Measure the relative shortening of shadow rays in the active Mitsuba variant.
+    """Return the relative shortening epsilon of shadow rays in the active Mitsuba variant [1].
 
-    Returns
-    -------
-    float
-        epsilon [1]: the ray from a point in the medium to a light at distance r has the length (1 - epsilon) r.
-
-    References
-    ----------
-    Mitsuba 3.9, ``Interaction.spawn_ray_to``; ``ShadowEpsilon`` in ``include/mitsuba/core/math.h``.
+    The ray from a point in the medium to a light at distance r has the length (1 - epsilon) r.
     """
     # A point of the medium has no surface normal, so its position is not offset and only the shortening is left.
     # One power of two times an axis: position, direction and length are exact, and so is the quotient.

@@ -1,31 +1,198 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A medium around the camera whose extinction differs from place to place: what all such media have."""
+r"""Media around the camera whose extinction differs from place to place: height fog and density grids.
 
+**Height fog** is a `heterogeneous` medium without sides whose extinction is a volume of type `heightfog`. The plugin
+(`validation.scenes.height_fog`) gives its numbers. Each estimator derives for itself what follows from them.
+
+**A density grid** is a `heterogeneous` medium with a `gridvolume`. Values sit at the centres of voxels, (i + 1/2)/n of
+the box of `to_world`. Between centres the extinction is trilinear, in the outer half voxels constant across the faces,
+beyond the box 0. Mitsuba tells Python values and, in words of six digits, the box; rays find its corners to all digits.
+Extinctions at random places are then compared with Mitsuba's, so that no other filter, wrap mode or transform is taken
+for this.
+"""
+
+import re
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 
+Array = NDArray[np.float64]
+
 NO_EXTINCTION = (
     "the medium has an extinction that differs from place to place, and this asks for one number; wanted a medium of "
     "type 'homogeneous'"
 )
+_PLACES = 512  # at which extinctions are compared
+_DIFFERENCE = 2e-3  # of the largest value: Mitsuba's places are rounded in float32
 
 
 @dataclass(frozen=True, kw_only=True)
 class VaryingMedium:
     """A medium of one albedo and one phase function, whose density is its class's own."""
 
-    albedo: NDArray[np.float64]  #: RGB
+    albedo: Array  #: RGB
     phase: PhaseFunction
-    largest: NDArray[np.float64]  #: a bound of the extinction, RGB [1/m]
+    largest: Array  #: a bound of the extinction, RGB [1/m]
     plugin: Any  #: Mitsuba's medium
 
     @property
-    def sigma_t(self) -> NDArray[np.float64]:
+    def sigma_t(self) -> Array:
         """Refuse: code that asks for one extinction would take the medium for a homogeneous one."""
         raise InputError(NO_EXTINCTION)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeightMedium(VaryingMedium):
+    """A medium whose density depends on height alone."""
+
+    layers: tuple[tuple[float, float, float], ...]  #: extinction at the base [1/m], base [m], scale height [m]
+    constant: float  #: extinction everywhere between floor and cap [1/m]
+    clamped: bool  #: whether layers are constant below their bases
+    floor: float  #: [m]
+    cap: float  #: [m]
+    up: Array  #: unit vector, (3,): heights are along it
+
+
+def is_height_fog(medium) -> bool:
+    """Return whether a medium of Mitsuba is height fog."""
+    return medium is not None and "sigma_t.H_1" in mi.traverse(medium)
+
+
+def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium:
+    """Read height fog; its albedo, RGB, and its phase function were read."""
+    parameters = mi.traverse(medium)
+    scale = float(parameters["scale"])
+    keys = [key for key in parameters.keys() if key.startswith("sigma_t.")]  # noqa: SIM118 - of pairs
+    number = {key.rpartition(".")[2]: np.array(parameters[key], dtype=np.float64).ravel() for key in keys}
+    layers = tuple(
+        (scale * sigma_t, float(number[f"z_{i}"][0]), float(number[f"H_{i}"][0]))
+        for i in "12"
+        if (sigma_t := float(number[f"sigma_{i}"][0])) > 0
+    )
+    largest = np.array(medium.get_majorant(dr.zeros(mi.MediumInteraction3f)), dtype=np.float64).reshape(-1)
+    return HeightMedium(
+        layers=layers,
+        constant=scale * float(number["sigma_0"][0]),
+        clamped=bool(number["clamped"][0]),
+        floor=float(number["floor"][0]),
+        cap=float(number["cap"][0]),
+        up=number["up"],
+        albedo=albedo,
+        phase=phase,
+        largest=np.array(np.broadcast_to(largest, 3)),
+        plugin=medium,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class GridMedium(VaryingMedium):
+    """A medium in a box along the axes, with an extinction on a grid."""
+
+    values: Array  #: extinction at the centres of voxels, (z, y, x) [1/m]
+    low: Array  #: corner of the box, (3,) [m]
+    high: Array  #: the opposite corner, (3,) [m]
+
+    def crossed(self, origin: Array, direction: Array) -> tuple[Array, Array]:
+        """Return the distances at which rays enter and leave the box, (n,) [m]; equal where they miss it."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([(corner - origin) / direction for corner in (self.low, self.high)])
+        # Along a face: within both planes or beyond one.
+        inside = (origin >= self.low) & (origin <= self.high)
+        near = np.where(direction == 0, np.where(inside, -np.inf, np.inf), ends.min(axis=0)).max(axis=-1)
+        far = np.where(direction == 0, np.where(inside, np.inf, -np.inf), ends.max(axis=0)).min(axis=-1)
+        meets = (far > near) & (far > 0)
+        return np.where(meets, np.maximum(near, 0.0), 0.0), np.where(meets, far, 0.0)
+
+    def extinction(self, point: Array) -> Array:
+        """Return the extinction at places in the box, (n,) [1/m]."""
+        return _trilinear(self.values, self.voxels(point))
+
+    def voxels(self, point: Array) -> Array:
+        """Return places in voxels from the centre of the first, (n, 3)."""
+        return (point - self.low) * self.voxels_per_metre - 0.5
+
+    @property
+    def voxels_per_metre(self) -> Array:
+        """Voxels along each axis over the side of the box, (3,) [1/m]."""
+        return np.array(self.values.shape[::-1]) / (self.high - self.low)
+
+
+def is_grid(medium) -> bool:
+    """Return whether a medium of Mitsuba has an extinction on a grid; one that is called homogeneous has no box."""
+    return medium is not None and not medium.is_homogeneous() and "sigma_t.data" in mi.traverse(medium)
+
+
+def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
+    """Read a grid around the camera; its albedo, RGB, and its phase function were read.
+
+    Raises InputError for what `grid_values` refuses, and for a grid that Mitsuba reads otherwise than `GridMedium`.
+    """
+    name = f"medium '{medium.id()}'"
+    values, low, high = grid_values(medium, name)
+    largest = np.full(3, values.max())
+    grid = GridMedium(values=values, low=low, high=high, albedo=albedo, phase=phase, largest=largest, plugin=medium)
+    fraction = np.random.default_rng(1).random((_PLACES, 3))
+    place = dr.zeros(mi.MediumInteraction3f, _PLACES)
+    place.p = mi.Point3f((low + fraction * (high - low)).T)
+    theirs = np.array(medium.get_scattering_coefficients(place)[2], dtype=np.float64)[0]
+    worst = np.abs(theirs - _trilinear(values, fraction * values.shape[::-1] - 0.5)).max() / values.max()
+    if worst > _DIFFERENCE:
+        raise InputError(
+            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "
+            "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales and moves alone"
+        )
+    return grid
+
+
+def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
+    """Return the extinctions of a medium with a grid, (z, y, x) [1/m], and the corners of its box, (3,) [m].
+
+    Messages call it by `name`. Raises InputError for a grid of several channels, and for values that are not finite,
+    below 0, or 0 alone.
+    """
+    parameters = mi.traverse(medium)
+    values = np.array(parameters["sigma_t.data"], dtype=np.float64)
+    if values.ndim > 3 and values.shape[3] != 1:
+        raise InputError(f"{name} has a grid of {values.shape[3]} channels; wanted a grid of one: grey extinction")
+    values = values.reshape(values.shape[:3]) * float(np.array(parameters["scale"]).ravel()[0])
+    if not np.isfinite(values).all() or values.min() < 0:
+        raise InputError(f"{name} has densities below 0 or not finite; wanted finite ones of 0 or more")
+    if not values.max() > 0:
+        raise InputError(f"{name} has a grid that is 0 everywhere; wanted densities above 0 somewhere")
+    return values, *_box(medium)
+
+
+def _box(medium: Any) -> tuple[Array, Array]:
+    """Return the corners of the box of a medium [m]: roughly by words, then by rays along the axes."""
+    words = str(medium).partition("sigma_t =")[2]
+    found = re.search(r"min = \[(.*?)\],\s*max = \[(.*?)\]", words, re.S)
+    if found is None:
+        raise InputError(f"Mitsuba says no box of medium '{medium.id()}'; wanted a 'gridvolume' as sigma_t")
+    low, high = (np.array([float(number) for number in part.split(",")]) for part in found.groups())
+    middle, corners = 0.5 * (low + high), np.stack([low, high])
+    for axis in range(3):
+        start = middle - np.eye(3)[axis] * (high - low)
+        ray = mi.Ray3f(mi.Point3f(*start.tolist()), mi.Vector3f(*np.eye(3)[axis].tolist()))
+        meets, near, far = medium.intersect_aabb(ray)
+        if meets[0]:
+            corners[:, axis] = float(np.float32(start[axis])) + np.array([float(near[0]), float(far[0])])
+    return corners[0], corners[1]
+
+
+def _trilinear(values: Array, place: Array) -> Array:
+    """Return the values of a grid (z, y, x) at places in voxels, (n, 3)."""
+    most = np.array(values.shape[::-1]) - 1
+    place = np.clip(place, 0, most)
+    cell = np.minimum(place.astype(np.int64), np.maximum(most - 1, 0))
+    total = np.zeros(len(place))
+    for corner in np.ndindex(2, 2, 2):
+        x, y, z = np.minimum(cell + corner, most).T
+        total += np.where(corner, place - cell, 1 - (place - cell)).prod(axis=1) * values[z, y, x]
+    return total

@@ -98,9 +98,8 @@ def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid:
 
 
 def _write_grid(path: Path, scene: Any) -> str:
-    from reference.scene.density_grid import GridMedium
-    from reference.scene.height_fog import HeightMedium
     from reference.scene.read import read_reference
+    from reference.scene.varying import GridMedium, HeightMedium
     from reports.interchange.fog_grid import write_fog_grid
 
     medium = read_reference(scene).medium

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from analytic.phase import PhaseFunction
-from reference.scene.density_grid import GridMedium
-from reference.scene.height_fog import HeightMedium
+from reference.scene.varying import GridMedium, HeightMedium
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,9 @@ from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
 from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.camera import camera_matrix
-from reference.scene.density_grid import GridMedium
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
-from reference.scene.varying import VaryingMedium
+from reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
 from reports.interchange.cycles import cycles_properties
 from validation.scenes.engine_fog import ENGINES, parameters_of
 from validation.scenes.loading import LoadedScene, scene_stem

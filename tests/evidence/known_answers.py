@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
 from reference.scene.read import ReferenceScene, read_reference

@@ -17,9 +17,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.monte_carlo import volpath
 from reference.monte_carlo.batches import LAYERS, Batches, merged
 from reference.monte_carlo.single_scatter import integrator as single_scatter
-from reference.monte_carlo.volpath import integrator as volpath
 from reference.quadrature import image as quadrature
 from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import PointPlan

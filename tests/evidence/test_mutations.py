@@ -159,10 +159,8 @@ def computed():
 
 def walked():
     slab = Slab(TAU, MU0, ALBEDO, HenyeyGreenstein(0.5), [DEPTH])
-    light = estimates.slab_estimate(slab, SETS, photons=60_000, seed=11)
-    exits = [each for row in light.sets for each in (row.reflected, row.transmitted, *row.fluence)]
-    parts = [[exit_.value, exit_.mean, exit_.rms] for exit_ in exits]
-    return np.array([[[part.value, part.error] for part in row] for row in parts])
+    exits = estimates.slab_estimate(slab, SETS, photons=60_000, seed=11).exits
+    return np.moveaxis(exits.reshape(2, -1, 3), 0, -1)
 
 
 def largest_z(values, photons):

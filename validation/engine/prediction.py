@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from reference.monte_carlo.batches import LAYERS
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.scene.read import ReferenceLight, ReferenceScene
 from validation.arrays import Array, Bools, Index
 from validation.engine.seen import Seen, relative_errors

@@ -13,8 +13,8 @@ from scipy.ndimage import binary_dilation
 from analytic.errors import InputError
 from reference.quadrature.emission import emitted_light
 from reference.quadrature.surface import surface_hits
-from reference.scene.density_grid import GridMedium
 from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
+from reference.scene.varying import GridMedium
 from reference.storage.exr import TOTAL, Image
 from validation.arrays import Array, Bools, Index
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer

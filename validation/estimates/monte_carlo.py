@@ -23,8 +23,7 @@ from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, merged
 from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch, set_layers
 from reference.monte_carlo.cloud_paths.opacity import seen_clouds
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath.integrator import volpath_batch
-from reference.monte_carlo.volpath.orders import volpath_orders_batch
+from reference.monte_carlo.volpath import volpath_batch, volpath_orders_batch
 from reference.quadrature.surface import surface_hits
 from reference.scene.clouds import read_clouds
 from reference.scene.read import read_reference
@@ -75,7 +74,7 @@ def monte_carlo_batches(
 
     The estimator is 'single-scatter', 'volpath' or 'cloud-paths'. There are 2 `batches` at least, of at most 256
     `samples` a pixel; the first has the seed `first_seed`, the others count up. For volpath alone there are
-    `max_depth`, the most edges of a path (`reference.monte_carlo.volpath.integrator.volpath_batch`), and `counts`,
+    `max_depth`, the most edges of a path (`reference.monte_carlo.volpath.volpath_batch`), and `counts`,
     samples of each pixel in each batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.allocation`).
     `orders` are names of disjoint sets of orders of scattering, '3-4', each with a layer of its own: for a scene of
     clouds, by 'volpath' or 'cloud-paths'.

@@ -26,8 +26,8 @@ import numpy as np
 
 from analytic.errors import InputError
 from reference.quadrature.fields import field_of
-from reference.scene.density_grid import GridMedium
 from reference.scene.read import ReferenceScene
+from reference.scene.varying import GridMedium
 from validation.arrays import Array, Index
 from validation.columns import column
 

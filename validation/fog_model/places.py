@@ -33,8 +33,8 @@ from reference.quadrature.pieces import Pieces, by_medium, cut, whole
 from reference.quadrature.segments import camera_segments
 from reference.quadrature.stretches import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceLight, ReferenceScene
+from reference.scene.varying import HeightMedium
 from reference.visibility.line_crossings import crossings
 from reference.visibility.planes import falloff, rays_at
 from validation.arrays import Array, Bools, Index

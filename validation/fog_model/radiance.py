@@ -24,8 +24,8 @@ import numpy as np
 
 from analytic.height_fog import HeightFog
 from reference.quadrature.height_fog import fog_of
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceScene
+from reference.scene.varying import HeightMedium
 from validation.arrays import Array
 from validation.fog_model.places import AROUND, Places
 from validation.fog_model.view import Ends, LightPaths, View

@@ -20,9 +20,9 @@ from reference.scene.area_light import ReferenceAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from reference.scene.device import as_rows, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import read_shapes
+from reference.scene.varying import HeightMedium
 from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.exact_distance import exact_distance

@@ -21,6 +21,8 @@ LARGEST_LIGHT = 1e18  #: of an intensity [W/sr] or an irradiance [W/m^2]
 _LIGHT = ("intensity", "irradiance", "radiance")
 _NOT_NEGATIVE = (*_LIGHT, "sigma_t", "albedo", "scale")
 _PLACES = ("z_1", "z_2", "floor", "cap", "up")  # of height fog
+_CUTOFF = "cutoff_angle"  # of spots, half of the cone [degrees]
+_LARGEST_ALBEDO = 1 + 1e-6  # rounding
 _CLIP = ("near_clip", "far_clip")  # no method takes them
 _NO_MATTER = ("vertex_texcoords",)
 _LEAST_SCALE = 1e-15  # of an axis of a transform [m]
@@ -79,14 +81,21 @@ def _check(name: str, key: str, values: Array) -> None:
     words = key.split(".")
     if words[-1] in _NO_MATTER:
         return
+    if words[-1] == _CUTOFF and not np.all((values > 0) & (values < 90)):
+        raise InputError(
+            f"{name}: {key} has {values.ravel()[0]:g} degrees; wanted more than 0 and less than 90: a wider light is a "
+            "'point' light"
+        )
     light = any(word in _LIGHT for word in words)
     largest = np.inf if words[-1] in _CLIP else LARGEST_LIGHT if light else LARGEST_LENGTH
+    if "albedo" in words:
+        largest = _LARGEST_ALBEDO
     least = 0.0 if any(word in _NOT_NEGATIVE for word in words) and words[-1] not in _PLACES else -largest
     wrong = ~((values >= least) & (values <= largest))
     if wrong.any():
         given = f"{values[wrong].ravel()[0]:g}"
         given += f" in {int(wrong.sum())} of {values.size} places" if values.size > 1 else ""
-        wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:g}"
+        wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:.3g}"
         raise InputError(f"{name}: {key} has {given}; wanted {wanted}: use other units, or the right sign")
     if words[-1] == "to_world":
         _check_transform(name, key, values.reshape(4, 4))

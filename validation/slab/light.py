@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from realtime.clouds.slab_orders.phases import SlabPhase
-from reference.monte_carlo.slab_walk.estimates import ExitEstimate, SlabEstimate, slab_estimate
+from reference.monte_carlo.slab_walk.estimates import SlabEstimate, slab_estimate
 from reference.monte_carlo.slab_walk.walk import Slab
 from validation.arrays import Array, Progress
 from validation.columns import plain
@@ -69,8 +69,8 @@ def slab_numbers(
         record["photons"] = {
             "count": photons,
             "seed": seed,
-            **_estimated(request, estimate, "value"),
-            "standard_error": _estimated(request, estimate, "error"),
+            **_estimated(request, estimate, 0),
+            "standard_error": _estimated(request, estimate, 1),
         }
     tell(1.0, "done")
     found: dict[str, Any] = plain(record)
@@ -134,23 +134,18 @@ def _exit(moments: Array, unit: float) -> Exit:
     return amount / unit, first / amount, math.sqrt(max(second / amount, 0.0))
 
 
-def _estimated(request: SlabRequest, estimate: SlabEstimate, field: str) -> dict[str, Any]:
-    """Return the values of photons, or their standard errors."""
-
-    def exits(each: ExitEstimate) -> Exit:
-        value, mean, rms = (getattr(part, field) for part in (each.value, each.mean, each.rms))
-        return value, mean, rms
-
+def _estimated(request: SlabRequest, estimate: SlabEstimate, which: int) -> dict[str, Any]:
+    """Return the values of photons for 0, or their standard errors for 1."""
+    exits, totals, flux = (part[which].tolist() for part in (estimate.exits, estimate.totals, estimate.flux))
     orders = [
-        _order_row(name, request.depths, exits(each.reflected), exits(each.transmitted), map(exits, each.fluence))
-        for name, each in zip(request.orders, estimate.sets, strict=True)
+        _order_row(name, request.depths, reflected, transmitted, fluence)
+        for name, (reflected, transmitted, *fluence) in zip(request.orders, exits, strict=True)
     ]
     total = {
-        "reflectance": getattr(estimate.reflectance, field),
-        "transmittance": getattr(estimate.transmittance, field),
+        "reflectance": totals[0],
+        "transmittance": totals[1],
         "flux": [
-            {"depth": depth, "up": getattr(up, field), "down": getattr(down, field)}
-            for depth, up, down in zip(request.depths, estimate.up, estimate.down, strict=True)
+            {"depth": depth, "up": up, "down": down} for depth, (up, down) in zip(request.depths, flux, strict=True)
         ],
         "radiance": [],
     }

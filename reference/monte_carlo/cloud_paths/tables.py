@@ -12,8 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from reference.monte_carlo.cloud_paths.phases import WalkPhase, walk_phase
-from reference.scene.cloud_density import CloudDensity
-from reference.scene.clouds import CloudScene
+from reference.scene.clouds import CloudDensity, CloudScene
 
 _FOUR_PI = 4 * np.pi
 #: How far past a crossing the next ray starts, relative to the largest coordinate: what float32 can tell apart.

@@ -225,7 +225,7 @@ class Ball:
         return LightSample(self.centre + normal * radius, normal, density)
 
 
-#: Emitting surfaces: `evenly(u, v)` samples points over the whole area, `towards(u, v, origin, direction)` for camera rays.
+#: Emitting surfaces: `evenly(u, v)` samples points over the area, `towards(u, v, origin, direction)` for camera rays.
 Emitting = Triangles | Flat | Ball
 
 

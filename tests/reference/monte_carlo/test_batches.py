@@ -17,7 +17,7 @@ from reference.monte_carlo.batches import (
     seed_ranges,
     single_batch,
 )
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 

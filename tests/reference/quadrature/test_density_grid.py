@@ -9,7 +9,7 @@ from scipy.integrate import quad, simpson
 
 from analytic.errors import InputError
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.fields import field_of
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
@@ -177,7 +177,7 @@ def test_other_grids_are_refused_by_name(reference, tmp_path, how, words):
 #: Faults that the comparison with volpath must find, by name.
 FAULTS = {
     "values at the corners of voxels": Wrap(
-        "reference.scene.density_grid:GridMedium.voxels", lambda function, self, point: function(self, point) + 0.5
+        "reference.scene.varying:GridMedium.voxels", lambda function, self, point: function(self, point) + 0.5
     ),
     "no attenuation on the way from the light": Wrap(
         "reference.quadrature.cell_walk:CellWalk.leave", lambda function, *others: 0 * function(*others)

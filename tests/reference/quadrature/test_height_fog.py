@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from analytic.height_fog import HeightFog
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.height_fog import fog_of
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
-from reference.scene.height_fog import HeightMedium
 from reference.scene.read import ReferenceMedium, read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from reference.scene.varying import HeightMedium
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
@@ -81,11 +81,9 @@ FAULTS = {
         "analytic.height_fog:height_fog_segments",
         lambda function, fog, rays, *others, **named: function(fog, replace(rays, light=rays.origin), *others, **named),
     ),
-    "1/H for H": Wrap(
-        "reference.scene.height_fog:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: 1 / h)
-    ),
+    "1/H for H": Wrap("reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: 1 / h)),
     "ln 2 left out": Wrap(
-        "reference.scene.height_fog:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: h * np.log(2))
+        "reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: h * np.log(2))
     ),
     "density at the camera for the mean": Wrap(
         "analytic.height_fog:HeightFog.optical_depth",

@@ -7,7 +7,7 @@ from scipy.integrate import cumulative_simpson, quad, simpson
 from scipy.special import expn
 
 from analytic.errors import InputError
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.replicates import PointPlan
 from reference.scene.read import read_reference

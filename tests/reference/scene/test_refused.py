@@ -15,6 +15,7 @@ from tests.helpers.lamps import area_lamp
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.suns import sun
 from validation.scenes.meshes import box, prism, star
+from validation.scenes.numbers import check_numbers
 from validation.scenes.parts import medium_boundary
 
 FOG = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
@@ -95,15 +96,18 @@ BOTH = [
     (lambda: lit("sphere", size=0.3, material={"type": "null"}, interior=FOG), "light 'lamp'.* bounds a medium"),
     (lambda: lit("rectangle", **radiance(texture())), "light 'lamp'.* textur"),
 ]
+#: Numbers that are refused before either side reads a scene, and by the methods too.
+NUMBERS = [
+    (lambda: fog(sigma_t=-1.0), "sigma_t"),
+    (lambda: fog(sigma_t=float("nan")), "sigma_t"),
+    (lambda: fog(albedo=1.5), "albedo"),
+    (lambda: tiny_scene(spot=spot(cutoff=95.0, beam=90.0)), "cutoff_angle .* 95 degrees; wanted more than 0"),
+    (lambda: lit("disk", size=0.3, **radiance({"type": "rgb", "value": [-1.0, 0.0, 0.0]})), "light '.*radiance"),
+]
 #: Scenes that only the methods refuse.
 METHODS = [
-    (lambda: fog(sigma_t=-1.0), "sigma_t is"),
-    (lambda: fog(sigma_t=float("nan")), "sigma_t is"),
-    (lambda: fog(albedo=1.5), "albedo is"),
     (lambda: ball(**CLEAR), "'ball' is transparent and bounds no medium"),
-    (lambda: tiny_scene(spot=spot(cutoff=95.0, beam=90.0)), "cutoff_angle"),
     (lambda: tiny_scene(sensor={"type": "thinlens", "aperture_radius": 0.1}), "ThinLens"),
-    (lambda: lit("disk", size=0.3, **radiance({"type": "rgb", "value": [-1.0, 0.0, 0.0]})), "light 'lamp'.* radiance"),
     (lambda: mesh(BOX[0] * (1, 1, 0), BOX[1]), "has no volume|not a closed"),
 ]
 REFERENCE = [(lambda: mesh(*prism(star(0.4, 1.0, 5), 1.0)), "'puff' bounds a medium and is not convex")]
@@ -114,6 +118,7 @@ REFERENCE = [(lambda: mesh(*prism(star(0.4, 1.0, 5), 1.0)), "'puff' bounds a med
     ("make", "words", "readers"),
     [
         *((*case, (read_scene, read_reference)) for case in BOTH),
+        *((*case, (read_scene, check_numbers)) for case in NUMBERS),
         *((*case, (read_scene,)) for case in METHODS),
         *((*case, (read_reference,)) for case in REFERENCE),
     ],

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.storage import kept as module
 from reference.storage.kept import (

@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 from validation.estimates.multiple_scattering import left_out, multiple_scattering_fraction

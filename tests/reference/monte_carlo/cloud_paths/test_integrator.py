@@ -18,7 +18,7 @@ from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from reference.monte_carlo.batches import merged
 from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
 from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-from reference.monte_carlo.volpath.orders import volpath_orders_batch
+from reference.monte_carlo.volpath import volpath_orders_batch
 from reference.scene.clouds import read_clouds
 from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, dense, length_inside, linear_between
 from validation.scenes.loading import load_scene

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from tests.helpers.density_grid import ROUGH, grid_xml, volume

@@ -19,15 +19,21 @@ with a weight; these are not shortened, so the shadow-ray epsilon counts in part
 than the epsilon of a short segment and meets a black light itself: within about 0.3 m of bounds, black lights are too
 dim.
 
+Clouds come by order of scattering: one more edge of the paths is one more order. Runs with `max_depth` n + 1 and n, of
+equal seeds, share their paths up to order n - 1, and their difference is order n alone, to rounding. Surfaces are black
+in these runs; all light with their own materials, less all without, is what met a surface. `hide_emitters` is not used
+there: the sky behind the clouds is in every run and cancels.
+
 Each batch has its own seed and at most 256 samples a pixel on the average; what a pixel gets may differ, see
 `reference.monte_carlo.allocation`. Sums, means and standard errors are taken in float64.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import drjit as dr
 import mitsuba as mi
@@ -36,9 +42,9 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches, check_samples, single_batch
-from reference.scene.density_grid import GridMedium
-from reference.scene.height_fog import HeightMedium
+from reference.scene.clouds import CloudScene
 from reference.scene.read import ReferenceScene, whole_scene
+from reference.scene.varying import GridMedium, HeightMedium
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.integer]
@@ -68,10 +74,8 @@ def volpath_batch(
     if counts is not None and max_depth != 2:
         raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
     in_air, on_surface = np.full((2, reference.width * reference.height), samples) if counts is None else counts
-    far = reference.directional or reference.sky is not None
-    if far and not reference.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
-        raise InputError("volpath: the scene's bounding box is not valid, so lights from infinity start within it")
-    _check_far(reference)
+    if reference.directional or reference.sky is not None:
+        _check_far(reference)
     hidden = {"hide_emitters": True} if reference.is_sampled else {}
     reference = replace(reference, scene=whole_scene(reference))
     integrator = mi.load_dict({"type": "volpath", "max_depth": max_depth, "rr_depth": 1000} | hidden)
@@ -92,15 +96,16 @@ def _check_far(reference: ReferenceScene) -> None:
     Those of a sky come from all directions: 60 degrees from the zenith they must leave height fog, and lower ones that
     are cut miss its thin upper part.
     """
+    if not reference.scene.bbox().valid():  # of rectangles alone, merged, in Mitsuba 3.9.1
+        raise InputError("volpath: the scene's bounding box is not valid, so lights from infinity start within it")
     medium, radius = reference.medium, float(reference.scene.bbox().bounding_sphere().radius)
-    rises = (
-        [float(-sun.direction @ medium.up) for sun in reference.directional] if isinstance(medium, HeightMedium) else []
-    )
     needed = 0.0
     if isinstance(medium, HeightMedium):
-        slowest = min(rises + [0.5] * (reference.sky is not None), default=np.inf)
-        needed = 0.5 * (medium.cap - medium.floor) / slowest
-    if isinstance(medium, GridMedium) and (reference.directional or reference.sky is not None):
+        rises = [float(-sun.direction @ medium.up) for sun in reference.directional] + [0.5] * (
+            reference.sky is not None
+        )
+        needed = 0.5 * (medium.cap - medium.floor) / min(rises)
+    elif isinstance(medium, GridMedium):
         needed = 0.5 * float(np.linalg.norm(medium.high - medium.low))
     if radius < needed:
         raise InputError(
@@ -203,3 +208,40 @@ def _set_values(plugin: Any, sigma_t: float, albedo: Array) -> None:
         # A grey number of Mitsuba is one value, a colour three.
         parameters[key] = kind(*(float(v) for v in value)) if "Color" in kind.__name__ else kind(float(value[0]))
     parameters.update()
+
+
+def volpath_orders_batch(
+    clouds: CloudScene, seed: int, samples: int, *, sets: Sequence[tuple[str, tuple[int, float]]]
+) -> Batches:
+    """Trace one batch of the layers `airlight`, `surface` and those of sets of orders.
+
+    `clouds`: the scene; `seed`: seed of the batch; different seeds are independent; `samples`: samples a pixel, at most
+    256; `sets`: names of sets of orders with their first and last order, the last `math.inf` for one without end.
+    """
+    check_samples(samples)
+    reference = ReferenceScene(
+        scene=clouds.scene,
+        occluders=clouds.occluders,
+        width=clouds.width,
+        height=clouds.height,
+        origin=clouds.origin,
+        direction=clouds.direction,
+        medium=clouds.around,
+        lights=(),
+        media=cast(Any, clouds.clouds),  # asked for what every medium has
+    )
+    counts = np.full(len(clouds.direction), samples)
+
+    def up_to(order: float):
+        depth = -1 if math.isinf(order) else int(order) + 1
+        integrator = mi.load_dict({"type": "volpath", "max_depth": depth, "rr_depth": 1 << 20})
+        return trace(reference, integrator, seed, counts)
+
+    wanted = {0, math.inf} | {end for _, (first, last) in sets for end in (first - 1, last)}
+    with black_surfaces(clouds.occluders):
+        sums = {order: up_to(order) for order in sorted(wanted)}
+    airlight = sums[math.inf] - sums[0]
+    surface = up_to(math.inf) - sums[math.inf] if clouds.occluders.shapes() else np.zeros_like(airlight)
+    by_set = [sums[last] - sums[first - 1] for _, (first, last) in sets]
+    names = ("airlight", "surface", *("airlight_" + name.replace("-", "_") for name, _ in sets))
+    return single_batch(seed, samples, np.stack([airlight, surface, *by_set]), layers=names)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from reference.monte_carlo.batches import merged
-from reference.monte_carlo.volpath.integrator import volpath_batch
+from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from reference.scene.shadow_epsilon import measure_shadow_epsilon
