@@ -27,7 +27,7 @@ _FOUND = 0.5  # fraction of the error that an explanation leaves at most if anyt
 _LEFT, _LEFT_OF_AREA = 0.004, 0.01  # mean relative error that is no fault
 _GAIN = 10.0  # what an explanation that leaves nothing makes of the error
 # Correlation of neighbours; noise has 0 +- 1/sqrt(pairs), 0.04 in an image of 32 x 24 pixels. The limit for noise alone
-# is # low, as no fault may hide in it; where an explanation was found, a pixel filter may correlate neighbours.
+# is low, as no fault may hide in it; where an explanation was found, a pixel filter may correlate neighbours.
 _NOISE, _NOISE_ALONE = 0.25, 0.1
 _EVEN = 2.0  # mean over median of errors that are noise; 1.2 of a normal distribution
 _WORST = 0.02  # fraction of the pixels that may be as wrong as they like

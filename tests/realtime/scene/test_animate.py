@@ -128,7 +128,7 @@ def test_moved_objects_are_those_of_a_file_with_the_object_moved(variant, method
         old, ours, theirs = (getattr(frame, name) for frame in (before, here, there))
         scale = theirs.mean()
         assert np.mean(np.abs(old - theirs).max(axis=-1) > 1e-2 * scale) > 0.02  # what moved is seen
-        # Rays and vertices are rounded to float32: 1e-6 of a distance. At an edge of the object or of its shadow, # a
+        # Rays and vertices are rounded to float32: 1e-6 of a distance. At an edge of the object or of its shadow, a
         # ray or a sample of it is on the other side, in a few pixels.
         same = np.isclose(ours, theirs, rtol=1e-4, atol=1e-4 * scale).all(axis=-1)
         assert np.mean(~same) < 0.01
