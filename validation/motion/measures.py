@@ -82,7 +82,6 @@ class Measures:
     ghost: Estimate
     ghost_by_age: tuple[Estimate, ...]  #: from one frame on
     trail_rmse: float | None
-    trail_bias: float | None
     trail_fraction: float  #: of the values
     pop: float | None  #: ratio to the median
     pop_frame: int | None
@@ -204,7 +203,7 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
     left: Array = np.zeros(())
     ghosts: Array = np.zeros(())
     beside: Array = np.zeros(())
-    trail = np.zeros(3)
+    trail = np.zeros(2)
     for n, light in enumerate(shown_light):
         if n == sequence.start[n]:
             window.clear()
@@ -226,7 +225,7 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         columns *= one * scale
         ghosts = ghosts + products(columns).astype(np.float64)
         there = one * (most > _TRAIL * mean)
-        trail += [there.sum(), (there * error).sum(), (there * error**2).sum()]
+        trail += [there.sum(), (there * error**2).sum()]
     total = first.sums.sum(axis=0)
     by_frame = np.array(first.frame_sums)
     pairs = by_frame[:, 3, 3] > 0
@@ -250,8 +249,7 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         ghost_by_age=tuple(
             regression(ghosts[:, [0, 1, 2 + age, -1]][:, :, [0, 1, 2 + age, -1]])[2] for age in range(1, AGES + 1)
         ),
-        trail_rmse=math.sqrt(trail[2] / trail[0]) / mean if trail[0] else None,
-        trail_bias=trail[1] / trail[0] / mean if trail[0] else None,
+        trail_rmse=math.sqrt(trail[1] / trail[0]) / mean if trail[0] else None,
         trail_fraction=float(trail[0] / total[0, 0]),
         pop=float(jumps.max() / median) if median > 0 else None,
         pop_frame=counted[places[int(np.argmax(jumps))]] if median > 0 else None,

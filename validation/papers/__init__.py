@@ -7,7 +7,7 @@ Read in this order:
 - `formulas.py`: printed formulas beside what they must be, what misprints cost, and droplets
 - `shadow_planes.py`: orders and shortcuts of shadow planes in images, and the stencil along a ray
 - `scattering.py`: multiple scattering, and the constant R of bounded media
-- `biri_tables.py`: Tables 1 and 2 of Biri 2006
+- `biri_tables.py`: Table 2 and the times of section 6 of Biri 2006
 - `light_volumes.py`: meshes, depths and maps of light volumes
 - `billeter_tables.py`: Figures 6 and 7 and Table 1 of Billeter 2010
 - `soft_shafts.py`: the figures of Ali 2016

@@ -49,7 +49,6 @@ class RandomScene:
     occluders: tuple[Occluder, ...]
     lit: float = 0.0  #: fraction of points in view that a light reaches
     near: float = 0.0  #: fraction of rays that meet a surface before half of the way to the middle of the stage
-    camera_lit: bool = False  #: whether the first light reaches the camera
 
     @property
     def enough(self) -> bool:
@@ -155,8 +154,7 @@ def with_reach(drawn: RandomScene, occluders: Any) -> RandomScene:
     points = (drawn.origin + (free[:, None] * fraction)[..., None] * directions[:, None]).reshape(-1, 3)
     lights = [_place(each) for each in drawn.lights]
     lit = np.any([lit_points(occluders, each, points) for each in lights], axis=0)
-    camera_lit = bool(lit_points(occluders, lights[0], drawn.origin[None])[0])
-    return replace(drawn, lit=float(lit.mean()), near=float((free < 0.5 * away).mean()), camera_lit=camera_lit)
+    return replace(drawn, lit=float(lit.mean()), near=float((free < 0.5 * away).mean()))
 
 
 def _directions(drawn: RandomScene) -> Array:
