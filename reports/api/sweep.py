@@ -210,20 +210,15 @@ def _part(
     from reports.cluster.connect import connected
     from reports.cluster.run import run_groups
 
-    missing = sum(len(cells) for _, cells in groups_of())
-    counts, open_cells, written = Counter[str](), dict[str, Any](), time.monotonic()
-
-    def groups() -> Any:
-        for group, cells in groups_of():
-            open_cells.update(cells)
-            yield group
-
-    if not missing:
+    waiting = list(groups_of())
+    cells = {key: cell for _, several in waiting for key, cell in several.items()}
+    counts, written = Counter[str](), time.monotonic()
+    if not cells:
         return 0, counts
     with connected(place, quick=quick) as cluster, telling(progress, f"sweep {study.name}") as tell:
-        for outcome in run_groups(cluster, groups(), made=made, retries=study.retries):
-            key = outcome.task.name
-            cell = open_cells.pop(key)
+        groups = [group for group, _ in waiting]
+        for outcome in run_groups(cluster, groups, made=made, retries=study.retries):
+            key, cell = outcome.task.name, cells[outcome.task.name]
             if outcome.status != "lost":
                 store.add(row_from(cell, key, outcome))
             counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
@@ -232,5 +227,5 @@ def _part(
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()
                 written = time.monotonic()
-            tell(counts.total() / missing, f"{counts.total()} of {missing} cells, {cell.scene}")
-    return missing, counts
+            tell(counts.total() / len(cells), f"{counts.total()} of {len(cells)} cells, {cell.scene}")
+    return len(cells), counts
