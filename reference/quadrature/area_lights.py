@@ -48,10 +48,9 @@ from reference.quadrature.stretches import Terms, cosine_profile, sums_of
 from reference.quadrature.surface import Reflection, SurfaceHits
 from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.read import ReferenceScene
-from reference.visibility.before_light import IN_PLANE, before_light
 from reference.visibility.candidates import Ball
 from reference.visibility.certificate import LitIntervals, RandomChecks
-from reference.visibility.lit_intervals import Obstacles, lit_intervals, obstacles
+from reference.visibility.lit_intervals import IN_PLANE, Obstacles, before_light, lit_intervals, obstacles
 from reference.visibility.planes import Rays, before, rays_at
 
 Array = NDArray[np.float64]

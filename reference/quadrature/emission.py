@@ -12,7 +12,7 @@ from reference.quadrature.fields import optical_depth
 from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.device import as_rows, vectors
 from reference.scene.read import ReferenceScene, scene_from
-from reference.visibility.line_crossings import half_chord
+from reference.visibility.distances import half_chord
 
 Array = NDArray[np.float64]
 

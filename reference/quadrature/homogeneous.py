@@ -35,7 +35,7 @@ from reference.quadrature.segments import Segments, camera_segments, depth_throu
 from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest
 from reference.scene.convex_bounds import Bounds, Sphere
 from reference.scene.read import ReferenceScene, homogeneous_around
-from reference.visibility.line_crossings import crossed_facets, crossings, sphere_crossings
+from reference.visibility.distances import crossed_facets, crossings, sphere_crossings
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]

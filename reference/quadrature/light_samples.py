@@ -54,8 +54,8 @@ from numpy.typing import NDArray
 
 from reference.quadrature.mesh_choice import Choice, choose_for_points, choose_for_rays, places_in
 from reference.scene.area_light import ReferenceAreaLight
-from reference.visibility.before_light import IN_PLANE
 from reference.visibility.certificate import LitIntervals
+from reference.visibility.lit_intervals import IN_PLANE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -33,7 +33,7 @@ from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.certificate import RandomChecks, reached_by_shadow_rays
-from reference.visibility.exact_distance import exact_distance
+from reference.visibility.distances import exact_distance
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

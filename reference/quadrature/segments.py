@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
 from reference.scene.read import ReferenceScene
-from reference.visibility.line_crossings import crossings, half_chord
+from reference.visibility.distances import crossings, half_chord
 from reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]

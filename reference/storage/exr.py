@@ -85,19 +85,8 @@ class Image:
 def layer(image: Image, name: str, path: str | os.PathLike[str] = "the image") -> NDArray[np.floating]:
     """Return a layer in the unit of the file, radiance [W/(m^2 sr)] in ours, (height, width, 3).
 
-    Parameters
-    ----------
-    image
-        The image.
-    name
-        The name of the layer; the empty name is the total.
-    path
-        The name of the image in messages.
-
-    Raises
-    ------
-    InputError
-        If the layer is missing, with the layers that exist and the nearest name.
+    `name`: of the layer; the empty name is the total; `path`: name of the image in messages. Raises InputError for a
+    layer that is not there, with the layers that are and the nearest name.
     """
     name = name or TOTAL
     if name in image.layers:

@@ -76,35 +76,15 @@ def ensure_writable(path: str | os.PathLike[str]) -> Path:
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str], *, flush: bool = True) -> Iterator[Path]:
-    r"""Give the name of a temporary file that becomes `path` when the block ends without an exception.
+    """Give the name of a temporary file that becomes `path` when the block ends without an exception.
 
     The temporary file lies in the same folder, so that the move is one step, and has the same suffix, so that a writer
     that picks the format by the suffix works. Any exception, a KeyboardInterrupt too, removes it and leaves `path` as
     it was.
 
-    Parameters
-    ----------
-    path
-        The file to write; its folder is made if needed.
-    flush
-        Wait for the disk, so that the file is whole after a loss of power too.
-
-    Yields
-    ------
-    Path
-        Where the block must write the file.
-
-    Raises
-    ------
-    InputError
-        If `path` cannot be written.
-    OSError
-        If the disk is full; it names `path`, which is as it was.
-
-    Examples
-    --------
-    >>> with atomic_path("table.csv") as temporary:  # doctest: +SKIP
-    ...     temporary.write_text("x,y\n")
+    `path`: the file to write; its folder is made if needed; `flush`: wait for the disk, so that the file is whole after
+    a loss of power too. The block writes the file that is yielded. Raises InputError if `path` cannot be written, and
+    OSError, which names `path`, if the disk is full.
     """
     target = ensure_writable(path)
     sweep_hidden(target.parent)

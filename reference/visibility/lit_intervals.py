@@ -7,18 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.convex_bounds import Sphere
-from reference.scene.read import ReferenceScene
+from reference.scene.read import ReferenceScene, scene_of
 from reference.scene.shapes import Shapes, read_shapes
 from reference.visibility.candidates import Ball, Near, near_shapes
 from reference.visibility.certificate import LitIntervals, certified
-from reference.visibility.line_crossings import crossings
+from reference.visibility.distances import crossings
 from reference.visibility.planes import Rays
 from reference.visibility.shadows import lit_parts
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+IN_PLANE = 1e-7  #: of the largest coordinate: what is closer to the plane of a light counts as in it; float32 corners
 _END = 1e-6  # of a distance: an interval that ends this close to the surface, met in float32 if need be, reaches it
 
 
@@ -41,6 +43,28 @@ def obstacles(reference: ReferenceScene, light: Ball, distance: Array, shapes: S
     shapes = read_shapes(reference.occluders) if shapes is None else shapes
     near = near_shapes(light, reference.origin, reference.direction, distance, shapes)
     return Obstacles(reference.occluders, shapes, near, light)
+
+
+def before_light(reference: ReferenceScene, light: ReferenceAreaLight) -> tuple[ReferenceScene, Shapes]:
+    """Return the scene and the shapes that can shadow an area light.
+
+    `reference`, `light`: the scene and one of its area lights.
+
+    A rectangle and a disk emit to one side, and a convex body shines on nothing that it hides itself: a light's own
+    shape therefore never shadows it, nor do shapes in or behind the plane of a rectangle or a disk. They are left out:
+    in float64 a shape in the plane would be in front of it or behind it by chance. Another mesh stays, a hair behind
+    where its light starts.
+    """
+    shapes = reference.occluders.shapes()
+    others = [shape for shape in shapes if shape != light.shape or light.shadows_itself]
+    if len(others) < len(shapes):
+        reference = replace(reference, occluders=scene_of(others, reference.scene))
+    known = read_shapes(reference.occluders)
+    if light.kind in ("rectangle", "disk"):
+        largest = max(1.0, float(np.abs(known.triangles).max(initial=0)), float(np.abs(light.centre).max()))
+        before = (known.triangles - light.centre) @ light.normal > IN_PLANE * largest
+        known = replace(known, triangles=known.triangles[before.any(axis=1)])
+    return reference, known
 
 
 def lit_intervals(

@@ -435,7 +435,7 @@ _WIDE = _all(
         "area-sections-of-one-length": Rewrite(
             _SAMPLES, "h_ * np.hypot(a_, b_) * per_density_", "h_ * np.hypot(a_, b_).mean() * per_density_"
         ),
-        "area-shadows-itself": Wrap("reference.visibility.before_light:before_light", _own_shape),
+        "area-shadows-itself": Wrap("reference.visibility.lit_intervals:before_light", _own_shape),
         "area-null-is-opaque": _sorted(True),
         "area-black-is-clear": _sorted(False),
         "area-surface-both-sides": Wrap(f"{_SAMPLES}:sections_for_points", _for_points),

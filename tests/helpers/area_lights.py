@@ -12,9 +12,8 @@ from reference.quadrature.light_samples import sections_for_points
 from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import ReferenceScene, read_reference
-from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
-from reference.visibility.lit_intervals import obstacles
+from reference.visibility.lit_intervals import before_light, obstacles
 from validation.scenes.meshes import Mesh, placed, rotation, scaled, torus
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}

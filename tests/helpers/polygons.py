@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.surface import surface_hits
 from reference.visibility.candidates import Ball
-from reference.visibility.exact_distance import exact_distance
+from reference.visibility.distances import exact_distance
 from reference.visibility.lit_intervals import obstacles
 from reference.visibility.planes import cone_interval, rays_at
 from tests.helpers.scenes import tiny_scene

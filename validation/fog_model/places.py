@@ -35,7 +35,7 @@ from reference.quadrature.stretches import lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.varying import HeightMedium
-from reference.visibility.line_crossings import crossings
+from reference.visibility.distances import crossings
 from reference.visibility.planes import falloff, rays_at
 from validation.arrays import Array, Bools, Index
 

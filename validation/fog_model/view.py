@@ -23,10 +23,9 @@ from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import read_shapes
 from reference.scene.varying import HeightMedium
-from reference.visibility.before_light import before_light
 from reference.visibility.candidates import Ball
-from reference.visibility.exact_distance import exact_distance
-from reference.visibility.lit_intervals import obstacles
+from reference.visibility.distances import exact_distance
+from reference.visibility.lit_intervals import before_light, obstacles
 from validation.arrays import Array, Bools, Index
 from validation.fog_model.places import Places, lengths, no_places, parallel_nodes, point_nodes, surface_points
 

@@ -37,7 +37,7 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import normals_at
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, homogeneous_around, read_reference
-from reference.visibility.line_crossings import crossings
+from reference.visibility.distances import crossings
 from validation.study.configuration import Configuration
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from reference.scene.clouds import CloudScene
 from reference.scene.shapes import triangles_of
-from reference.visibility.exact_distance import to_plane
+from reference.visibility.distances import to_plane
 
 Array = NDArray[np.float64]
 

@@ -92,11 +92,8 @@ def walk(slab: Slab, photons: int, random: np.random.Generator) -> Counts:
 def flights(slab: Slab, photons: int, random: np.random.Generator) -> Iterator[tuple[float, Vectors, Vectors]]:
     """Yield the flights of a batch of photons, order by order, until all have left, for tallies to count.
 
-    Yields
-    ------
-    weight, place, direction
-        The fraction left by absorption; x, y and the depth z of the photons, and the components of their directions,
-        the third downwards, (photons,) each.
+    Yields the fraction left by absorption; x, y and the depth z of the photons; and the components of their directions,
+    the third downwards, (photons,) each.
     """
     place = np.zeros(photons), np.zeros(photons), np.zeros(photons)
     sine = np.sqrt((1 - slab.mu0) * (1 + slab.mu0))

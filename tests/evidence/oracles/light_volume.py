@@ -50,7 +50,7 @@ from reference.quadrature.light_airlight import lit_sums
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.visibility.certificate import LitIntervals
-from reference.visibility.exact_distance import exact_distance
+from reference.visibility.distances import exact_distance
 from reference.visibility.planes import Rays, cone_interval, rays_at
 from tests.evidence.oracles.height_field import Array, HeightField, Index, Path, by_ray, height_field, zero_angle
 from tests.evidence.oracles.upright_walls import walled_parts

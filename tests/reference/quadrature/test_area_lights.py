@@ -17,9 +17,9 @@ from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
 from reference.quadrature.shared_samples import shared_samples
 from reference.quadrature.surface import Reflection, surface_hits
 from reference.scene.read import read_reference
-from reference.visibility.before_light import before_light
 from reference.visibility.certificate import segments_blocked
-from reference.visibility.exact_distance import exact_distance
+from reference.visibility.distances import exact_distance
+from reference.visibility.lit_intervals import before_light
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers.area_lights import (
     GREY,

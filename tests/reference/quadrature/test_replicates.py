@@ -14,7 +14,7 @@ from scipy.stats import norm, skew
 from reference.quadrature.area_lights import area_surface, beams_of
 from reference.quadrature.replicates import PILOT, REPLICATES, PointPlan, replicate_means, standard_error
 from reference.quadrature.surface import surface_hits
-from reference.visibility.exact_distance import exact_distance
+from reference.visibility.distances import exact_distance
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers.area_lights import GREY, airlight_replicates, fixed, fog, lamp, lit_room, turned
 

@@ -10,7 +10,7 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_reference
 from reference.scene.shapes import read_shapes
 from reference.visibility.certificate import reached_by_shadow_rays, segments_blocked
-from reference.visibility.exact_distance import exact_distance
+from reference.visibility.distances import exact_distance
 from tests.helpers.scenes import tiny_scene
 
 
