@@ -22,7 +22,7 @@ import airlight
 from realtime.methods.interface.marching import marched_steps
 from realtime.methods.interface.method import Layers
 from realtime.parameters import parameter
-from realtime.scene.light_table import light_tables
+from realtime.scene.light_samples import light_tables
 
 
 @dataclass(frozen=True)

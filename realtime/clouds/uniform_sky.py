@@ -86,6 +86,8 @@ def escapes(phase: SlabPhase, albedo: float) -> Array:
 
 def slab_escapes(tau: float, phase: SlabPhase, albedo: float) -> Array:
     """Return the fractions of a slab of the thickness `tau`, (cosines, sets); see `escapes`."""
+    from scipy.interpolate import make_interp_spline
+
     rule = double_gauss(_STREAMS)
     moments = phase.moments(2 * _STREAMS + 1)
     peak = float(moments[-1])
@@ -108,18 +110,9 @@ def slab_escapes(tau: float, phase: SlabPhase, albedo: float) -> Array:
     sets = [sum(leaving[first:end]) for first, end in pairwise(bounds)] + [edges[0, upward]]
     cosines = rule.mu[upward]
     fractions = np.stack(sets, axis=-1) / -np.expm1(-tau / cosines)[:, None]
-    wanted = np.linspace(0.0, 1.0, COSINES)
-    return np.stack([_along(wanted, cosines, fractions[:, number]) for number in range(len(sets))], axis=-1)
-
-
-def _along(wanted: Array, cosines: Array, values: Array) -> Array:
-    """Return values between and beyond the cosines, linear in them."""
-    inside = np.interp(wanted, cosines, values)
-    ends = ((wanted < cosines[0], 0, 1), (wanted > cosines[-1], -1, -2))
-    for beyond, last, next_ in ends:
-        slope = (values[last] - values[next_]) / (cosines[last] - cosines[next_])
-        inside = np.where(beyond, values[last] + slope * (wanted - cosines[last]), inside)
-    return np.maximum(inside, 0.0)
+    # Linear between the cosines and beyond them.
+    line = make_interp_spline(cosines, fractions, k=1)
+    return np.maximum(line(np.linspace(0.0, 1.0, COSINES)), 0.0)
 
 
 #: (point [m], light) -> whether no opaque shape is between them.

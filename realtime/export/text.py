@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The kernels `exact` and `quadrature-N` as shader code: one template, and the constants of the Python kernels in it.
 
-The pages of `realtime.kernels.exact` and `realtime.kernels.quadrature` derive what the text computes. `exact` has all
+The pages of `realtime.kernels.exact` and `realtime.kernels.stepping` derive what the text computes. `exact` has all
 segments by panels in v, without the rules for short ones.
 
 **Elementary functions are our own.** Those of drivers are allowed to be, and are, wrong where it matters: on llvmpipe
@@ -18,7 +18,6 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.export.languages import LANGUAGES
 from realtime.kernels.exact import DEEPEST, MOST_PANELS
-from realtime.kernels.quadrature import positive_nodes
 from realtime.numerics.functions import EXP2, LOG2_E, SINH, unit_nodes
 from realtime.scene.media.medium import OPTICAL_REACH
 from realtime.scene.phase import Hazy, HenyeyGreenstein, HgDraine, Isotropic, Murky, Phase, Rayleigh
@@ -270,8 +269,7 @@ def _exact(phase: Phase) -> str:
 
 
 def _quadrature(phase: Phase, nodes: int) -> str:
-    places, weights = zip(*positive_nodes(nodes), strict=True)
-    half = len(places)
+    places, weights = zip(*unit_nodes(nodes), strict=True)
     arguments = "height, {}, {}, sigma_t, g"
     whole = "al_panel(foot, " + arguments.format("x0", "x1") + ")"
     split = "    float between = min(max(foot, x0), x1);\n"
@@ -283,32 +281,19 @@ def _quadrature(phase: Phase, nodes: int) -> str:
 float al_panel(float foot, float height, float x0, float x1, float sigma_t, float g) {{
 {_interval("1.0")}    float c0 = sqrt(e0 * e0 + 1.0);
     float c1 = sqrt(e1 * e1 + 1.0);
-    float width = 0.5 * al_asinh(difference * ((e0 + e1) / (e1 * c0 + e0 * c1)));
-    float root = al_exp(0.5 * width);
-    float sinh_half = 0.5 * (root - 1.0 / root);
-    float cosh_half = 0.5 * (root + 1.0 / root);
-    float sinh_mid = 2.0 * sinh_half * cosh_half;
-    float less_mid = 2.0 * sinh_half * sinh_half;
-    float step = e0 * less_mid + c0 * sinh_mid;
-    float e = e0 + step;
-    float c = c0 + (e0 * sinh_mid + c0 * less_mid);
-    float rate = sigma_t * h;
+    float width = al_asinh(difference * ((e0 + e1) / (e1 * c0 + e0 * c1)));
     float total = 0.0;
-    for (int i = 0; i < {half}; i += 1) {{
+    for (int i = 0; i < {nodes}; i += 1) {{
         float grown = al_exp(width * AL_X[i]);
         float sh = 0.5 * (grown - 1.0 / grown);
-        float ch = 0.5 * (grown + 1.0 / grown);
-        float even = -rate * e * (ch - 1.0);
-        float odd = -rate * c * sh;
-        float after = 1.0 / (c * ch + e * sh);
-        float before = 1.0 / (after * (ch * ch + e * e));
-        float up1 = min(after * after, 1.0);
-        float up2 = min(before * before, 1.0);
-        float value1 = al_exp(even + odd) * after * al_phase(1.0 - up1, up1, g);
-        float value2 = al_exp(even - odd) * before * al_phase(1.0 - up2, up2, g);
-        total = total + AL_W[i] * (value1 + value2);
+        float less = 0.5 * (grown + 1.0 / grown) - 1.0;
+        float more = e0 * less + c0 * sh;
+        float e = e0 + more;
+        float up = 1.0 / (e * e + 1.0);
+        float value = (c0 + (e0 * sh + c0 * less)) * up * al_phase(e * e * up, up, g);
+        total = total + AL_W[i] * value * al_exp(max(-sigma_t * h * more, -{_number(DEEPEST / LOG2_E)}));
     }}
-    return total * width * (2.0 / h) * al_exp(-sigma_t * (x0 + r0 + h * step));
+    return total * width * (2.0 / h) * al_exp(-sigma_t * (x0 + r0));
 }}
 
 {_TAKES}float al_integral(float foot, float height, float x0, float x1, float sigma_t, float g) {{

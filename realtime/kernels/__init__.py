@@ -5,8 +5,7 @@ Read in this order:
 
 - `registry.py`: what a kernel is, and the kernels by name;
 - `exact.py`: the default: as few nodes as a segment needs, and E = q/h, which most kernels integrate over;
-- `quadrature.py`: Gauss-Legendre nodes in w = asinh(q/h);
-- `stepping.py`: fixed steps along the ray or in the angle at the light, by the midpoint rule or Gauss's;
+- `stepping.py`: rules of a fixed size, midpoint steps or Gauss's nodes, along the ray, in the angle or in asinh(q/h);
 - `taylor.py`: the polynomial of Biri 2006 with derived or printed coefficients;
 - `table.py`: the published table of the integral;
 - `closed_form.py`: the closed form of Pegoraro and Parker 2009.

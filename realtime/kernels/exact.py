@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The default kernel: as few Gauss-Legendre nodes as a segment needs, placed by the phase function's own lobe.
 
-With E = q/h as in `realtime.kernels.quadrature`,
+With E = q/h (q = (x - foot) + r, the path form of DESIGN section 2),
 
     J = (2/h) exp(-sigma_t (x0 + r0)) int_{E0}^{E1} exp(-sigma_t h (E - E0)) p / (1 + E^2) dE,
     sin^2(angle/2) = E^2/(1 + E^2),   cos^2(angle/2) = 1/(1 + E^2).
@@ -342,18 +342,29 @@ def _over_subsegments(geometry: RayGeometry, segment, extinctions, phase: Phase,
 def _subsegment(geometry: RayGeometry, x0, x1, extinctions, phase: Phase, light: Light):
     Float = type(geometry.height)
     scale, tail = phase.lobe_scales(Float)
-    h, e0, e1, difference = path_interval(geometry, x0, x1, reduce(dr.minimum, extinctions), tail=tail)
+    nodes, most = (PANEL_NODES, PANEL_DEPTH) if is_single(Float) else (_NODES_DOUBLE, _DEPTH_DOUBLE)
+    h, start, width = range_of_v(geometry, x0, x1, reduce(dr.minimum, extinctions), scale, tail)
+    decays = [sigma_t * h for sigma_t in extinctions]
+    weight = falloff_by_path(geometry, light, h)
+    means = panels_mean(phase, start, scale, width, decays, weight, nodes=nodes, most=most)
+    shared = (width * scale) * (2 / h)
+    return [mean * shared * transmittance_before(geometry, x0, h, sigma_t) for mean, sigma_t in zip(means, extinctions)]
+
+
+def range_of_v(geometry: RayGeometry, x0, x1, sigma_t, scale=1.0, tail=1.0):
+    """Return the height [m], (F, C) at the beginning of a segment, and its length in v."""
+    h, e0, e1, difference = path_interval(geometry, x0, x1, sigma_t, tail=tail)
     f0, f1 = e0 / scale, e1 / scale
     c0, c1 = dr.sqrt(dr.fma(f0, f0, 1)), dr.sqrt(dr.fma(f1, f1, 1))
-    width = dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
+    return h, (f0, c0), dr.asinh((difference / scale) * ((f0 + f1) / dr.fma(f1, c0, f0 * c1)))
 
-    def weight(e):
-        return geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e)))
 
-    decays = [sigma_t * h for sigma_t in extinctions]
-    nodes, most = (PANEL_NODES, PANEL_DEPTH) if is_single(Float) else (_NODES_DOUBLE, _DEPTH_DOUBLE)
-    shape = weight if light.varies else None
-    means = panels_mean(phase, (f0, c0), scale, width, decays, shape, nodes=nodes, most=most)
-    r0 = dr.sqrt(dr.fma(x0 - geometry.foot, x0 - geometry.foot, h * h))
-    shared = (width * scale) * (2 / h)
-    return [mean * shared * dr.exp(-sigma_t * (x0 + r0)) for mean, sigma_t in zip(means, extinctions)]
+def falloff_by_path(geometry: RayGeometry, light: Light, h):
+    """Return the function of E that gives the relative intensity of a light; None for one that does not vary."""
+    return (lambda e: geometry.falloff_beside(light, 0.5 * h * (e - dr.rcp(e)))) if light.varies else None
+
+
+def transmittance_before(geometry: RayGeometry, x0, h, sigma_t):
+    """Return exp(-sigma_t (x0 + r0)), the transmittance at the beginning of a segment."""
+    s0 = x0 - geometry.foot
+    return dr.exp(-sigma_t * (x0 + dr.sqrt(dr.fma(s0, s0, h * h))))

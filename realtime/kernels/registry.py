@@ -19,8 +19,7 @@ from typing import Any
 
 from realtime.kernels.closed_form import closed_form
 from realtime.kernels.exact import exact
-from realtime.kernels.quadrature import quadrature
-from realtime.kernels.stepping import equiangular, quadrature_theta, uniform
+from realtime.kernels.stepping import equiangular, quadrature, quadrature_theta, uniform
 from realtime.kernels.table import table
 from realtime.kernels.taylor import taylor
 
@@ -47,7 +46,7 @@ KERNELS: dict[str, Kernel] = {
         "quadrature",
         quadrature,
         "Gauss-Legendre nodes in w = asinh(q/h)",
-        "the path form of the airlight equation, realtime/kernels/quadrature.py",
+        "the path form of the airlight equation, realtime/kernels/stepping.py",
         MappingProxyType({"nodes": 16}),
     ),
     "taylor": Kernel(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rules of shaders: fixed steps along the ray or in the angle at the light, by the midpoint rule or Gauss's.
+"""Rules of a fixed size: midpoint steps or Gauss's nodes along the ray, in the angle at the light, or in asinh E.
 
 * `uniform`: J ~ sum_k dx exp(-sigma_t (x_k + r_k)) p / r_k^2.
 * `equiangular` and `quadrature_theta`: with x = foot + h tan theta, dx/r^2 = dtheta/h, so J ~ sum_k w_k/h exp(-sigma_t
@@ -7,7 +7,8 @@
 
 The midpoint rule is of order 2 in the number of steps once these resolve the integrand. Gauss and Legendre's converges
 like a power of it where the segment ends before theta nears pi/2; there exp(-sigma_t h/cos theta) has an essential
-singularity, which `realtime.kernels.quadrature` avoids.
+singularity, which `quadrature` avoids: in v = asinh E (`realtime.kernels.exact` with d = 1) no singularity is near the
+real axis, and the integrand decays on its own.
 """
 
 from typing import Any
@@ -15,8 +16,9 @@ from typing import Any
 import drjit as dr
 
 from realtime.errors import InputError
+from realtime.kernels.exact import falloff_by_path, range_of_v, transmittance_before
 from realtime.numerics.array_types import smallest
-from realtime.numerics.functions import summed, unit_nodes
+from realtime.numerics.functions import exp_bounded, summed, unit_nodes
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
@@ -83,6 +85,41 @@ def quadrature_theta(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: 
         return total * (width / h)
 
     return medium.per_extinction(lambda sigma_t: sum(panel(sigma_t, a, b) for a, b in panels))
+
+
+def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, nodes: int = 16):
+    """Return the airlight integral J by one Gauss-Legendre rule in v = asinh E, d = 1 [1/m].
+
+    `nodes`: how many. The segment is split at the foot (E = 1), where forward lobes end, unless
+    the phase function is isotropic, and at the cone of the beam where a spot falls off between beam and cut-off.
+
+    Valid for any ray that does not pass through the light, any extinction, vacuum included, and `x1` infinite. With 16
+    nodes and an isotropic phase function the relative error in float32 stays below about 1e-5 for optical depths up to
+    100; sharp phase functions (g above 0.8) need more nodes.
+    """
+    _check("nodes", nodes)
+    if not medium.phase.constant and not light.varies:
+        split = dr.clip(geometry.foot, x0, x1)
+        segments = [(x0, split), (split, x1)]
+    else:
+        segments = geometry.smooth_subsegments(light, x0, x1)
+
+    def of_segment(sigma_t, x0, x1):
+        h, (e0, c0), width = range_of_v(geometry, x0, x1, sigma_t)
+        falloff = falloff_by_path(geometry, light, h)
+        total = type(h)(0)
+        for fraction, weight in unit_nodes(nodes):
+            grown = exp_bounded(width * fraction)
+            # Where the difference cancels, it moves a node by a rounding error of E.
+            sinh, less = 0.5 * (grown - dr.rcp(grown)), 0.5 * (grown + dr.rcp(grown)) - 1
+            step = dr.fma(e0, less, c0 * sinh)
+            value = medium.phase.density(e0 + step, dr.fma(e0, sinh, dr.fma(c0, less, c0)), 1.0)
+            if falloff is not None:
+                value *= falloff(e0 + step)
+            total += weight * value * exp_bounded(-sigma_t * h * step)
+        return total * width * (2 / h) * transmittance_before(geometry, x0, h, sigma_t)
+
+    return medium.per_extinction(lambda sigma_t: sum(of_segment(sigma_t, a, b) for a, b in segments))
 
 
 def _check(name: str, count: int) -> None:

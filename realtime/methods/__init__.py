@@ -14,6 +14,5 @@ Read in this order:
 - `cloud_collectors.py`: light of many orders in clouds, from where it enters them.
 - `registry.py`: the methods by name, and how a name becomes a method.
 - `shader/`: a user's shader, drawn by OpenGL in a process of its own.
-- `user_method.py`: a user's plain function or class, made a method with its errors named.
-- `user_result.py`: what that returned, checked.
+- `user_method.py`: a user's plain function or class, made a method with its errors named and its results checked.
 """

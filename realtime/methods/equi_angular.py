@@ -29,7 +29,7 @@ from realtime.methods.interface.method import Layers, Method, View, animate
 from realtime.numerics.functions import summed
 from realtime.numerics.noise import PATTERNS
 from realtime.parameters import parameter
-from realtime.scene.light_table import light_tables
+from realtime.scene.light_samples import light_tables
 from realtime.scene.lights import Light
 
 _STEP = 0.7548776662466927  # 1/g with g^3 = g + 1

@@ -16,7 +16,6 @@ Read in this order:
 - `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;
 - `read_media.py`: reads the media of a Mitsuba scene;
 - `read_scene.py`: reads a Mitsuba scene, and says what it needs of a method;
-- `light_samples.py`: area lights as light samples;
-- `light_table.py`: lights of one structure as a table, from which rays take them by chance;
+- `light_samples.py`: area lights as light samples, and lights of one structure as a table;
 - `animate.py`: the scene after lights, the medium or objects moved.
 """

@@ -82,10 +82,6 @@ class Isotropic(Phase):
         """Return 1."""
         return type(up)(1)
 
-    def evaluate(self, cos_scatter) -> Any:
-        """Return 1."""
-        return type(cos_scatter)(1)
-
     def density(self, f, c, scale) -> Any:
         """Return 1/c: where the scale is 1 it is p/c."""
         return dr.rcp(c)
@@ -105,16 +101,6 @@ class Rayleigh(Phase):
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
         return 0.75 * dr.fma(up - down, up - down, 1)
-
-    def evaluate(self, cos_scatter) -> Any:
-        """Return the value."""
-        return 0.75 * dr.fma(cos_scatter, cos_scatter, 1)
-
-    def density(self, f, c, scale) -> Any:
-        """Return p/c: the scale is 1."""
-        inverse = dr.rcp(c)
-        cos = dr.fma(2 * inverse, inverse, -1)
-        return inverse * dr.fma(0.75 * cos, cos, 0.75)
 
     def series(self, degree: int) -> list[Any]:
         """Return the coefficients of 3 (1 + sin^2)/4."""
@@ -151,10 +137,6 @@ class Hazy(_Power):
         """Return the value from (1 -+ cos)/2."""
         return 0.5 + 4.5 * _power(up, 3)
 
-    def evaluate(self, cos_scatter) -> Any:
-        """Return the value."""
-        return 0.5 + 4.5 * _power(0.5 + 0.5 * cos_scatter, 3)
-
 
 @dataclass(frozen=True)
 class Murky(_Power):
@@ -168,10 +150,6 @@ class Murky(_Power):
     def evaluate_half(self, down, up) -> Any:
         """Return the value from (1 -+ cos)/2."""
         return (33 / 83) * dr.fma(50.0, _power(up, 5), 1)
-
-    def evaluate(self, cos_scatter) -> Any:
-        """Return the value."""
-        return (33 / 83) * dr.fma(50.0, _power(0.5 + 0.5 * cos_scatter, 5), 1)
 
 
 @dataclass(frozen=True)

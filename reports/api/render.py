@@ -389,8 +389,7 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
 def _plan(asked: _Asked) -> "Said":
     """Return what a scene needs of a method."""
     from realtime.methods.registry import find_method
-    from realtime.methods.shadow_planes.method import ShadowPlanes
-    from realtime.methods.shadow_planes.plane_counts import describe_occluders, occluder_plan
+    from realtime.methods.shadow_planes.method import ShadowPlanes, occluders_in_words
     from realtime.parameters import values
     from realtime.scene.light_samples import with_light_samples
     from realtime.scene.read_scene import describe
@@ -408,7 +407,7 @@ def _plan(asked: _Asked) -> "Said":
         words["light samples"] = f"{points.points} of each area light, {points.pattern}"
         seen = with_light_samples(read, 1, "ring")  # the occluders as the middle of each sees them
     if issubclass(method, ShadowPlanes):
-        words |= describe_occluders(occluder_plan(seen))
+        words |= occluders_in_words(seen)
         _warnings(prepared(read, asked.chosen))
     lines = [*(f"{name}: {said}" for name, said in words.items()), *notes]
     return Said(name=loaded.name, data={"plan": words, "notes": list(notes)}, lines=lines)

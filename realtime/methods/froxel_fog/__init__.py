@@ -3,8 +3,7 @@
 
 Read in this order:
 
-- `grid.py`: where the froxels of a view are, and where a point is among them;
+- `grid.py`: where the froxels of a view are, and the airlight from the camera to the end of each slice;
 - `injection.py`: the light that reaches the middle of each froxel and is scattered there to the camera;
-- `accumulation.py`: the airlight from the camera to the end of each slice, by the integral within a slice;
 - `method.py`: the parameters, and the stages of a frame.
 """

@@ -16,8 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.memory import check_memory
-from realtime.methods.froxel_fog.accumulation import accumulated, airlight_at_pixels
-from realtime.methods.froxel_fog.grid import column_rays, view_grid
+from realtime.methods.froxel_fog.grid import accumulated, airlight_at_pixels, column_rays, view_grid
 from realtime.methods.froxel_fog.injection import LightSampleTable, Visibility, frame_shift, scattered_light
 from realtime.methods.interface.method import Layers, Method, View
 from realtime.numerics.array_types import bytes_of

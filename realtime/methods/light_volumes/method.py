@@ -16,7 +16,7 @@ how it is crossed:
   from the light find (`realtime.methods.light_volumes.jump_search`).
 * `mesh`, as published: the boundary becomes triangles (`realtime.methods.light_volumes.published.mesh`), each is drawn
   over the pixels that it covers (`realtime.methods.light_volumes.published.raster`), and terms are added up as they
-  come (`realtime.methods.light_volumes.published.signed_sum`). The `static` mesh is the height field itself, an
+  come (`realtime.methods.light_volumes.published.raster`). The `static` mesh is the height field itself, an
   `adaptive` one has fewer triangles where the map is flat (`realtime.methods.light_volumes.published.tessellation`).
 """
 
@@ -28,7 +28,7 @@ from realtime.errors import InputError
 from realtime.methods.interface.method import Method, tolerance
 from realtime.methods.light_volumes.jump_search import with_walls
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
-from realtime.methods.light_volumes.published.signed_sum import mesh_airlight
+from realtime.methods.light_volumes.published.raster import mesh_airlight
 from realtime.methods.light_volumes.walk import sum_lit_intervals
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import parameter

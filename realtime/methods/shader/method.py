@@ -18,7 +18,7 @@ from realtime.methods.shader.client import ShaderHost
 from realtime.methods.shader.prelude import phase_text, stage_text
 from realtime.methods.shader.scene_arrays import check_scene, light_array, map_array, phase_table, ray_arrays, uniforms
 from realtime.methods.shader.source import ShaderSource, read_shader
-from realtime.methods.user_result import checked_radiance
+from realtime.methods.user_method import checked_radiance
 from realtime.parameters import parameter, values
 from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_size
 

@@ -12,7 +12,5 @@ Read in this order:
 - `plane_table.py`: planes as four numbers, by wedges of azimuth.
 - `sweep.py`: the lit intervals of a ray, along the planes of its list.
 - `published_crossings.py`: the sum of the paper, plane by plane with a stencil.
-- `published_mesh.py`: its Gamma at the vertices of meshes.
-- `published_media.py`: its Gamma in bounded media, medium by medium.
-- `plane_counts.py`: how many occluders, edges and planes there are, for `--plan`.
+- `published_mesh.py`: its Gamma at the vertices of meshes, also in bounded media, medium by medium.
 """

@@ -13,7 +13,7 @@ import pytest
 import airlight
 from realtime.export.text import BUILT_IN, CONFORMING, kernel_text
 from realtime.kernels.exact import exact
-from realtime.kernels.quadrature import quadrature
+from realtime.kernels.stepping import quadrature
 from realtime.methods.shader.client import ShaderHost
 from realtime.scene.phase import named_phase
 from reports.api.export import MEASURED

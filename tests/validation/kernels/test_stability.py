@@ -11,7 +11,7 @@ import pytest
 from analytic.errors import InputError
 from analytic.phase import PHASE_NAMES, PhaseFunction
 from realtime.errors import InputError as RealtimeInputError
-from realtime.kernels.quadrature import quadrature
+from realtime.kernels.stepping import quadrature
 from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.kernel_values import take
 from validation.kernels.benchmark import measure, speed_against_error

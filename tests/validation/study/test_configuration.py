@@ -11,8 +11,8 @@ import pytest
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.renderer import render_frame
-from realtime.kernels.quadrature import quadrature
 from realtime.kernels.registry import KERNELS
+from realtime.kernels.stepping import quadrature
 from realtime.methods.registry import FOG_METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene

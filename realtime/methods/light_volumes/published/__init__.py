@@ -5,6 +5,6 @@ Read in this order:
 
 - `mesh.py`: the displaced grid of a shadow map, joined to the light.
 - `tessellation.py`: fewer triangles where the map is flat.
-- `raster.py`: every triangle against every pixel that it covers, with the sign of each crossing.
-- `signed_sum.py`: the airlight as a sum over the crossings in any order.
+- `raster.py`: every triangle against every pixel that it covers, with the sign of each crossing, and the airlight as
+  their sum.
 """

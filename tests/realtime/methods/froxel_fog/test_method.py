@@ -8,8 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.methods.froxel_fog.accumulation import accumulated
-from realtime.methods.froxel_fog.grid import Grid, column_rays
+from realtime.methods.froxel_fog.grid import Grid, accumulated, column_rays
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Isotropic
 from realtime.scene.read_scene import read_scene

@@ -17,7 +17,7 @@ from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.exact import exact
-from realtime.kernels.quadrature import quadrature
+from realtime.kernels.stepping import quadrature
 from realtime.kernels.taylor import taylor
 from realtime.methods.registry import METHODS
 from realtime.numerics.array_types import array_types
