@@ -57,8 +57,18 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.bounds import CloudSurfaces, Crossing, next_crossing
-from realtime.clouds.march import OPAQUE, SPREAD, depths_along, least, march, middle_density, voxel
+from realtime.clouds.march import (
+    OPAQUE,
+    SPREAD,
+    CloudSurfaces,
+    Crossing,
+    depths_along,
+    least,
+    march,
+    middle_density,
+    next_crossing,
+    voxel,
+)
 from realtime.numerics.array_types import PerRay, chosen_value
 from realtime.numerics.functions import exp_bounded, exp_expm1_bounded
 from realtime.scene.lights import Light

@@ -30,7 +30,7 @@ corners or at none.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import drjit as dr
@@ -168,23 +168,13 @@ def adaptive_layers(
         # Whole tiles of lanes, the last one again, so that no recorded function finds an array of one entry.
         count = dr.width(rough)
         rough = dr.gather(mi.UInt32, rough, dr.minimum(dr.arange(mi.UInt32, -(-count // TILE) * TILE), count - 1))
-        handed_on = gathered(at_corners.carried, rough // TILE)
+        carried = at_corners.carried
+        handed_on = None if carried is None else dr.gather(type(carried), carried, rough // TILE)
         asked = dr.gather(mi.UInt32, pixel, rough), dr.gather(Float, distance, rough)
         some, some_masks = _parts(render(*asked, handed_on), Float)
         for image, values in zip(blended, (*some, *some_masks), strict=True):
             dr.scatter(image, values + dr.zeros(Float, dr.width(rough)), rough)
     return _with_parts(at_corners, blended[: len(numbers)], [part > 0.5 for part in blended[len(numbers) :]])
-
-
-def gathered(value: Any, index: PerRay) -> Any:
-    """Return arrays, or what holds some, at other places."""
-    if value is None:
-        return None
-    if isinstance(value, tuple | list):
-        return type(value)(gathered(item, index) for item in value)
-    if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{item.name: gathered(getattr(value, item.name), index) for item in fields(value)})
-    return dr.gather(type(value), value, index)
 
 
 def _is_mask(fraction: Any) -> bool:

@@ -35,12 +35,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
 from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, fraction_of_peak, slab_phase
 from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
-from realtime.clouds.light_depths import LightDepths, depths_memory, sun_depths
+from realtime.clouds.density_maps import LightDepths, dense_surface, depths_memory, lit_dense_surface, sun_depths
 from realtime.clouds.light_maps import (
     LightMap,
     filtered_map,
@@ -49,8 +48,7 @@ from realtime.clouds.light_maps import (
     maps_memory,
     shade,
 )
-from realtime.clouds.lit_surface import dense_surface, lit_dense_surface
-from realtime.clouds.march import segment_by_lengths, segment_through
+from realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
 from realtime.clouds.single_scattering import (
     Beam,
     CloudRays,
@@ -83,7 +81,6 @@ class CloudCollectors(Method):
     summary = "clouds: light of all orders from where it enters them, found by light maps and the transport of a slab"
     source = "Bouthors, Neyret, Max, Bruneton, Crassin 2008"
     renders_clouds = True
-    layers = (*ORDER_LAYERS, OPACITY)
     prepared_from = frozenset({"geometry", "light"})
     casts_rays = True
     provides_visibility = True

@@ -21,10 +21,9 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from realtime.clouds.bounds import CloudSurfaces, cloud_surfaces
 from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, order_layer
-from realtime.clouds.light_depths import LightDepths, sun_depths
-from realtime.clouds.march import segment_by_lengths, segment_through
+from realtime.clouds.density_maps import LightDepths, sun_depths
+from realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
 from realtime.clouds.single_scattering import Beam, cloud_rays, light_on_surfaces, light_once, opacity_of, sky_behind
 from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from realtime.errors import InputError
@@ -64,7 +63,6 @@ class CloudOctaves(Method):
     summary = "clouds: single scattering with less extinction in every octave, as in game engines"
     source = "Wrenninge 2013; Hillaire 2016"
     renders_clouds = True
-    layers = (*ORDER_LAYERS, OPACITY)
     prepared_from = frozenset({"geometry", "light"})
     casts_rays = True
     provides_visibility = True

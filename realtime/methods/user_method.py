@@ -7,7 +7,7 @@ with the types of their defaults. The result is checked, because nothing else ch
 It is not frozen unless its author says that it can be: a frozen function that copies NumPy's arrays in or reads values
 out ends the process (Dr.Jit 1.5). Tracing `unshadowed` again for every frame costs 0.3 ms (2 threads).
 
-The result of a user method, converted to a colour for every pixel or refused.
+The result is converted to a colour for every pixel, or refused.
 """
 
 import importlib
@@ -284,7 +284,7 @@ def _summary(function: Any) -> str:
     return text.splitlines()[0] if text else "a method of one's own"
 
 
-_WANTED = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
+_RESULT = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
 
 
 def checked_radiance(returned: Any, view: View, name: str):
@@ -310,7 +310,7 @@ def checked_radiance(returned: Any, view: View, name: str):
     channels = _dr_channels(returned, name) if dr.is_array_v(returned) else _channels(returned, width, name)
     for channel in channels:
         if dr.width(channel) not in (1, width):
-            raise InputError(f"method {name}: returned {dr.width(channel)} values for {width} pixels; {_WANTED}")
+            raise InputError(f"method {name}: returned {dr.width(channel)} values for {width} pixels; {_RESULT}")
     # A constant has one entry: every pixel gets it.
     return Color(*(Float(channel) + dr.zeros(Float, width) for channel in channels))
 
@@ -356,7 +356,7 @@ def _dr_channels(returned: Any, name: str) -> tuple[Any, ...]:
             return (returned,) * 3
         if dr.depth_v(kind) == 2 and len(returned) == 3:
             return tuple(returned)
-    raise InputError(f"method {name}: returned a {kind.__module__}.{kind.__name__}; {_WANTED}")
+    raise InputError(f"method {name}: returned a {kind.__module__}.{kind.__name__}; {_RESULT}")
 
 
 def _channels(returned: Any, width: int, name: str) -> tuple[Any, ...]:
@@ -367,10 +367,10 @@ def _channels(returned: Any, width: int, name: str) -> tuple[Any, ...]:
     except (TypeError, ValueError):
         right = False
     if not right:
-        raise InputError(f"method {name}: returned a {type(returned).__name__}; {_WANTED}")
+        raise InputError(f"method {name}: returned a {type(returned).__name__}; {_RESULT}")
     if values.ndim == 0:
         return (float(values),) * 3
     if values.shape not in ((width,), (width, 3)):
-        raise InputError(f"method {name}: returned an array of shape {values.shape} for {width} pixels; {_WANTED}")
+        raise InputError(f"method {name}: returned an array of shape {values.shape} for {width} pixels; {_RESULT}")
     double = np.ascontiguousarray(values, dtype=np.float64)
     return (mi.Float64(double),) * 3 if double.ndim == 1 else tuple(mi.Float64(column) for column in double.T.copy())

@@ -25,7 +25,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.array_types import is_single
+from realtime.numerics.array_types import four_numbers, is_single
 
 TURN = 4.0  #: a full turn
 
@@ -204,6 +204,8 @@ def between_entries(table, places: Sequence[tuple[Any, int]], width: int = 1, fi
             for index, part in corners
             for step in (0, 1)
         ]
+    if width == 4:  # read at once
+        return list(sum(part * dr.gather(four_numbers(Float), table, index) for index, part in corners))
     return [
         sum(part * dr.gather(Float, table, index * width + number) for index, part in corners)
         for number in range(width)

@@ -9,8 +9,7 @@ Read in this order:
 - `density.py`: clouds whose density differs from place to place;
 - `lights.py`: point, spot and directional lights as homogeneous positions;
 - `media/`: media, which answer for themselves: extinction, optical depths, airlight;
-- `closed_mesh.py`: closed meshes of any shape, and what lies inside;
-- `convex_bounds.py`: the convex bounds of media;
+- `closed_mesh.py`: closed meshes of any shape, what lies inside, and the convex bounds of media;
 - `directional_extent.py`: the smallest rectangle across a directional light through which all light of the media comes;
 - `triangle_table.py`: what shading needs of every triangle;
 - `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;

@@ -6,6 +6,12 @@ sum of the solid angles of its triangles over 4 pi (Van Oosterom and Strackee 19
 seen from the point,
 
     tan(angle/2) = a . (b x c) / (|a||b||c| + (a . b)|c| + (b . c)|a| + (c . a)|b|).
+
+**Convex bounds of media:** the half spaces of a closed convex mesh, or a sphere, read from Mitsuba's shapes.
+
+Facets that lie in one plane are one half space: a cube has 6, not 12. Vertices are float32 numbers, so "in one plane"
+and "convex" hold to 1e-5 of the size of the body; triangles thinner than that have no plane worth the name, and their
+neighbours bound the body without them.
 """
 
 from dataclasses import dataclass
@@ -17,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
+from realtime.scene.mesh_adjacency import mesh_triangles
 
 Array = NDArray[np.float64]
 
@@ -93,3 +100,179 @@ def encloses(mesh: ClosedMesh, point: Array) -> bool:
 def shape_number(shape: Any) -> int:
     """Return the number of a shape in Mitsuba's registry."""
     return int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+
+
+_OUTWARDS = "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too"
+FLAT = 1e-5  #: relative to the size of the body
+CELLS = 8  #: of directions along each axis, by which walks over the facets find a place to begin
+_SOME = 64  # triangles by which most shapes that are not convex are told at once
+_SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """A convex body: what lies in all half spaces normal . x <= offset, or in the sphere where there are none."""
+
+    name: str
+    normals: Array  #: unit vectors that point outwards, (planes, 3)
+    offsets: Array  #: (planes,) [m]
+    corners: Array  #: of the triangles, (triangles, 3, 3) [m]
+    centre: Array  #: of a sphere that holds the body [m]
+    radius: float  #: of that sphere [m]
+
+    @property
+    def is_sphere(self) -> bool:
+        """Whether the body is its sphere."""
+        return not len(self.offsets)
+
+
+def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
+    """Read the bounds of a medium from a shape.
+
+    `shape`: a Mitsuba shape. Returns `bounds`: its convex bounds; None where it is not convex; `mesh`: its triangles;
+    None for a sphere. Raises InputError for a shape that is neither a sphere nor a closed mesh with its normals
+    outwards, with its name.
+    """
+    name = shape.id()
+    if shape.class_name() == "Sphere":
+        return _read_sphere(shape), None
+    if not shape.is_mesh() or shape.class_name() == "Rectangle":
+        raise _refusal(name, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed mesh")
+    vertices, faces = mesh_triangles(shape)
+    faces = faces[:, ::-1] if shape.has_flipped_normals() else faces
+    mesh = closed_mesh(name, vertices, faces)
+    return mesh_bounds(name, vertices, faces, mesh), mesh
+
+
+def _read_sphere(shape) -> Bounds:
+    box = shape.bbox()
+    low, high = np.array(box.min, dtype=np.float64).ravel(), np.array(box.max, dtype=np.float64).ravel()
+    size = high - low
+    if np.ptp(size) > FLAT * size.max():
+        raise _refusal(shape.id(), "is a sphere with different scales along its axes", "one scale, or a mesh")
+    if shape.has_flipped_normals():
+        raise _refusal(shape.id(), "is inside out", "normals that point outwards: remove flip_normals")
+    return Bounds(
+        shape.id(), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), 0.5 * (low + high), float(size.mean() / 2)
+    )
+
+
+def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any], mesh: ClosedMesh | None = None) -> Bounds | None:
+    """Return the bounds that the mesh `name` describes, None where it is not convex.
+
+    `name`: for messages; `vertices`: positions [m], (vertices, 3); `faces`: vertex numbers, counter-clockwise seen from
+    outside, (faces, 3); `mesh`: the same as `closed_mesh` returns it, if it is known. Raises InputError for a mesh that
+    is not closed, inside out or flat.
+    """
+    mesh = mesh or closed_mesh(name, vertices, faces)
+    corners = vertices[faces]
+    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(area, axis=1)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    volume = np.sum((corners[:, 0] - vertices.mean(axis=0)) * area) / 6
+    if not abs(volume) > FLAT * size**3 * 1e-3:
+        raise _refusal(name, "has no volume", "a closed mesh around a body")
+    if volume < 0:
+        flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
+        raise _refusal(name, flaw, _OUTWARDS)
+    sound = twice > FLAT * size * longest
+    normals = area[sound] / twice[sound, None]
+    offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
+    some = slice(None, None, max(1, len(normals) // _SOME))
+    if np.any(vertices @ normals[some].T > offsets[some] + 2 * FLAT * size):
+        return None
+    normals, offsets = _merged(normals, offsets, size)
+    if np.any(vertices @ normals.T > offsets + 2 * FLAT * size):
+        return None
+    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    radius = float(np.linalg.norm(vertices - centre, axis=1).max())
+    return Bounds(name, normals, offsets, corners, centre, radius)
+
+
+def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:
+    """Keep one plane of all that coincide."""
+    key = np.column_stack([normals, offsets / size])
+    kept: list[int] = []
+    for number, row in enumerate(key):
+        if not kept or np.abs(key[kept] - row).max(axis=1).min() > FLAT:
+            kept.append(number)
+    return normals[kept], offsets[kept]
+
+
+def _refusal(name: str, flaw: str, wanted: str) -> InputError:
+    return InputError(f"shape '{name}' bounds a medium and {flaw}; wanted {wanted}")
+
+
+def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
+    """Return by plane the planes that share an edge with it, filled up with its own number, (planes, most of any).
+
+    Planes through the same two corners, to the precision of the corners: where facets are tiny that may be more.
+    """
+    corners = np.unique(bounds.corners.reshape(-1, 3), axis=0)
+    on = np.abs(corners @ bounds.normals.T - bounds.offsets) < 4 * FLAT * bounds.radius
+    shared = on.T.astype(np.float32) @ on.astype(np.float32)
+    np.fill_diagonal(shared, 0)
+    rows = [np.flatnonzero(row >= 2) for row in shared]
+    table = np.repeat(np.arange(len(rows), dtype=np.uint32)[:, None], max(len(row) for row in rows), axis=1)
+    for number, row in enumerate(rows):
+        table[number, : len(row)] = row
+    return table
+
+
+def radial_planes(bounds: Bounds) -> NDArray[np.uint32]:
+    """Return by cell of directions from the centre a plane that is met there; cells are `CELLS` along each axis."""
+    places = (np.arange(CELLS) + 0.5) * (2 / CELLS) - 1
+    z, y, x = np.meshgrid(places, places, places, indexing="ij")
+    along = np.stack([x, y, z], axis=-1).reshape(-1, 3) @ bounds.normals.T
+    distance = bounds.offsets - bounds.normals @ bounds.centre
+    with np.errstate(divide="ignore"):
+        at = np.where(along > 0, distance / along, np.inf)
+    return at.argmin(axis=1).astype(np.uint32)
+
+
+def holds(bounds: Bounds, point: Array) -> bool:
+    """Return whether a point lies inside [m], (3,)."""
+    if bounds.is_sphere:
+        return bool(np.linalg.norm(point - bounds.centre) < bounds.radius)
+    return bool(np.all(bounds.normals @ point < bounds.offsets))
+
+
+def touches(bounds: Bounds, point: Array) -> bool:
+    """Return whether a point lies in the boundary [m], (3,), to what float32 knows of it."""
+    margin = 1e-6 * (bounds.radius + float(np.abs(point).max()))
+    if bounds.is_sphere:
+        return bool(abs(np.linalg.norm(point - bounds.centre) - bounds.radius) < margin)
+    beyond = float((bounds.normals @ point - bounds.offsets).max())
+    return abs(beyond) < margin
+
+
+def mean_distance(bounds: Bounds) -> float:
+    """Return R, the average distance between a point of the boundary and a point of the body [m].
+
+    Both are uniform, by area and by volume, and independent: one reading of "the average distance between a point
+    located in the boundary and a point in the medium". In a sphere the mean over the boundary is a + d^2/(3 a) for a
+    point at the distance d from the centre, so R = 6 a/5. In a mesh it is the mean over 65 536 pairs drawn once for all
+    from a fixed seed, with a standard error of about 0.2 %.
+
+    Biri, Arques, Michelin 2006, section 4.2.
+    """
+    if bounds.is_sphere:
+        return 1.2 * bounds.radius
+    random = np.random.default_rng(20_061)
+    corner = bounds.corners
+    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    middle = np.unique(corner.reshape(-1, 3), axis=0).mean(axis=0)
+    volume = np.sum((corner[:, 0] - middle) * area, axis=1)
+    boundary = _on_triangles(corner, np.linalg.norm(area, axis=1), random)
+    # The body is the tetrahedra from its middle to its triangles.
+    inside = middle + np.cbrt(random.random((_SAMPLES, 1))) * (_on_triangles(corner, volume, random) - middle)
+    return float(np.mean(np.linalg.norm(boundary - inside, axis=1)))
+
+
+def _on_triangles(corner: Array, fraction: Array, random) -> Array:
+    """Draw points that are uniform on each triangle, which is chosen by its fraction."""
+    fraction = np.maximum(fraction, 0)
+    chosen = corner[random.choice(len(corner), _SAMPLES, p=fraction / fraction.sum())]
+    u, v = np.sqrt(random.random((_SAMPLES, 1))), random.random((_SAMPLES, 1))
+    return (1 - u) * chosen[:, 0] + u * (1 - v) * chosen[:, 1] + u * v * chosen[:, 2]

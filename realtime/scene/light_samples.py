@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Area lights as light samples: what methods render of them.
 
-Lights of one structure as a table, from which each ray takes lights by number, and by chance after their power.
+**Lights of one structure as a table**, from which each ray takes lights by number, and by chance after their power.
 
 A loop over lights in Python makes a kernel that grows with them. A table makes all of them one: its rows are gathered.
 The power of a light is its intensity times the solid angle that it shines into, and tables pick a light by the inverse

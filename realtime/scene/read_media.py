@@ -16,9 +16,10 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, aligned_array
-from realtime.scene.closed_mesh import ClosedMesh, encloses
-from realtime.scene.convex_bounds import (
+from realtime.scene.closed_mesh import (
     Bounds,
+    ClosedMesh,
+    encloses,
     holds,
     mean_distance,
     plane_neighbours,

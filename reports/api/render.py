@@ -257,7 +257,7 @@ def _ready(asked: _Asked, frames: int, layers: bool, progress: Progress) -> tupl
     loaded, read = asked.read()
     _check_work(loaded.name, read, asked.chosen, frames)
     note(progress, read.features.notes)
-    layered = layers and bool(find_method(asked.chosen.method).layers)
+    layered = layers and find_method(asked.chosen.method).renders_clouds
     made = prepared(read, asked.chosen, extra_layers=layered)
     return loaded, read, replace(made, run=asked.run, frame=asked.frame), layered
 

@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.methods.soft_shafts.march import source_state
+from realtime.methods.soft_shafts.sources import source_state
 from realtime.scene.light_samples import with_light_samples
 from realtime.scene.read_scene import read_scene
 from realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map

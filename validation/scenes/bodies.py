@@ -19,8 +19,16 @@ from scipy.sparse.csgraph import connected_components
 from analytic.errors import InputError
 from realtime.errors import InputError as MeshError
 from realtime.numerics.array_types import aligned_array
-from realtime.scene.closed_mesh import ClosedMesh, encloses, shape_number, winding_number
-from realtime.scene.convex_bounds import FLAT, Bounds, holds, read_bounds
+from realtime.scene.closed_mesh import (
+    FLAT,
+    Bounds,
+    ClosedMesh,
+    encloses,
+    holds,
+    read_bounds,
+    shape_number,
+    winding_number,
+)
 from realtime.scene.mesh_adjacency import scene_of
 from validation.arrays import Array, Index
 

@@ -13,7 +13,7 @@ z the distance along the axis. Slices are equal steps of s. Their distribution i
 which begins at the camera: up to the depth `near` slices are about equally thick, beyond it in proportion to their
 depth. Media beyond `far` scatter nothing.
 
-The airlight from the camera to the end of each slice, and from there to any depth.
+**The airlight from the camera to the end of each slice, and from there to any depth.**
 
 Along a ray the airlight is L(x) = int_0^x S(y) exp(-tau(y)) dy, with S the scattered light and tau the optical depth
 from the camera, tau' = sigma. Let S and sigma be constant in a slice [x_k, x_k + D]. There tau(y) = tau_k + sigma (y -
@@ -47,6 +47,7 @@ import mitsuba as mi
 
 from realtime.methods.interface.method import View
 from realtime.numerics.array_types import Metres, PerRay, four_numbers
+from realtime.numerics.functions import between_entries
 from realtime.scene.camera import Camera, row_and_column
 from realtime.scene.media.medium import Medium, Rays
 
@@ -137,34 +138,6 @@ def _reach(view: View, position: Any, medium: Medium) -> Metres:
     return dr.maximum(dr.dot(away, view.camera.forward), 0) + reach
 
 
-def trilinear(volume: Any, size: tuple[int, int, int], place: tuple[Any, Any, Any]) -> Any:
-    """Return values between the eight neighbours of a place, a colour.
-
-    `volume`: four numbers a value, across first, then down, then in depth; `size`: how many values there are across,
-    down and in depth; `place`: where, in steps of the grid from the first value on; beside the grid it is the value at
-    its border.
-    """
-    Float = type(volume)
-    corners, weights = [], []
-    for steps, last in zip(place, (count - 1 for count in size), strict=True):
-        inside = dr.minimum(dr.maximum(steps, 0), last)
-        # A NaN must not become an index out of bounds: whole numbers are bounded again.
-        low = dr.minimum(mi.UInt32(inside), last)
-        corners.append((low, dr.minimum(low + 1, last)))
-        weights.append(inside - Float(low))
-    x, y, z = corners
-    value = four_numbers(Float)(0)
-    for k, layer in enumerate(z):
-        for j, row in enumerate(y):
-            for i, column in enumerate(x):
-                fraction = Float(1)
-                for side, weight in zip((i, j, k), weights):
-                    fraction = fraction * (weight if side else 1 - weight)
-                index = (layer * size[1] + row) * size[0] + column
-                value = dr.fma(dr.gather(four_numbers(Float), volume, index), fraction, value)
-    return value.xyz
-
-
 _THIN = 0.1  # optical depth of a slice up to which the series serves
 _TERMS = 8  # of it: 0.1^8/9! = 3e-14 is left out
 
@@ -224,5 +197,6 @@ def airlight_at_pixels(view: View, grid: Grid, volume: Any) -> PerRay:
     u = (Float(column) + 0.5) * (grid.width / camera.width) - 0.5
     v = (Float(row) + 0.5) * (grid.height / camera.height) - 0.5
     depth = dr.minimum(view.distance * dr.dot(view.direction, camera.forward), grid.far)
-    s = grid.fraction(depth) * grid.slices
-    return type(view.medium.albedo)(trilinear(volume, (grid.width, grid.height, grid.slices + 1), (u, v, s)))
+    across = [(v / (grid.height - 1), grid.height), (u / (grid.width - 1), grid.width)]
+    red, green, blue, _ = between_entries(volume, [(grid.fraction(depth), grid.slices + 1), *across], 4)
+    return type(view.medium.albedo)(red, green, blue)

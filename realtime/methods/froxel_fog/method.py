@@ -47,8 +47,8 @@ class FroxelFog(Method):
     prepared_from = frozenset({"geometry", "light"})
     at_once = True
 
-    width: int = parameter(160, "froxels across the image", least=1, most=4096)
-    height: int = parameter(90, "froxels down the image", least=1, most=4096)
+    width: int = parameter(160, "froxels across the image", least=2, most=4096)
+    height: int = parameter(90, "froxels down the image", least=2, most=4096)
     slices: int = parameter(64, "froxels in depth", least=1, most=4096)
     far: float = parameter(
         0.0, "depth where the grid ends; 0: at the farthest surface, or where light fades", least=0, unit="m"

@@ -190,9 +190,9 @@ class Method(Parameters):
     summary: ClassVar[str] = "a method of one's own"  #: what it does, for tables
     source: ClassVar[str] = "one's own"  #: the paper
     shadows: ClassVar[bool] = True  #: whether it knows shadows; one that does not is wrong where there are occluders
-    #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate the surfaces.
+    #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate the surfaces, and has
+    #: `Layers.extra` by order of scattering.
     renders_clouds: ClassVar[bool] = False
-    layers: ClassVar[tuple[str, ...]] = ()  #: the names that `Layers.extra` may have
     light_samples: ClassVar[LightSamples] = LightSamples()  #: how it renders area lights by default
 
     # Facts for the frame. Each may be a property that follows from the parameters.

@@ -17,7 +17,7 @@ occluders.
 Beyond the last row Gamma keeps its value there. Surfaces interpolate Gamma between the vertices of their triangles
 (5.1.3).
 
-Shadow planes in bounded media, medium by medium, with Gamma at vertices (Biri 2006, sections 4.2 and 5.2).
+**In bounded media**, medium by medium (Biri 2006, sections 4.2 and 5.2).
 
 "When several participating media exist, stages 3 to 5 need to be computed for each one of them." In the medium m, which
 a ray enters at A and leaves at F, with the end E at F or at the surface before that,

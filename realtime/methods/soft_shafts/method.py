@@ -9,9 +9,9 @@ Fig. 4.9.
 The stages of a frame:
 
 1. `prepare`: a table of the light samples, and their maps.
-2. Airlight of every `scale`-th pixel by `steps` steps for each point (`march.py`), a number per ray and light.
+2. Airlight of every `scale`-th pixel by `steps` steps for each point (`sources.py`), a number per ray and light.
 3. The bilateral filter, on log(1 + L / mean L), and joint up-sampling with a depth test.
-4. The fraction of each light that reaches each pixel's surface (`surfaces.py`), and its filter, before anything is
+4. The fraction of each light that reaches each pixel's surface, and its filter, before anything is
    shaded.
 5. The frame multiplies the unshadowed surface by that fraction and adds the airlight, both in linear radiance.
 
@@ -46,16 +46,19 @@ from realtime.image_filters import (
 )
 from realtime.methods.interface.marching import marched_integral
 from realtime.methods.interface.method import Layers, View
-from realtime.methods.soft_shafts.march import Fraction, SourceState, integral_of_points, source_state
 from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
-from realtime.methods.soft_shafts.surfaces import (
+from realtime.methods.soft_shafts.sources import (
     AUTO_WIDTH,
     AUTO_WIDTH_SHARED,
+    Fraction,
     Reached,
+    SourceState,
     blockers_of,
     few_pixels,
+    integral_of_points,
     penumbra_width,
     reached_surfaces,
+    source_state,
 )
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.light_samples import frame_at

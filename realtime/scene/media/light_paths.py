@@ -46,7 +46,7 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.numerics.array_types import four_numbers
-from realtime.scene.convex_bounds import CELLS
+from realtime.scene.closed_mesh import CELLS
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous, Medium
 
@@ -58,18 +58,18 @@ _STEEP, _LEAST, _MOST = 0.2, 0.002, 0.25  #: of the square of half a chord in a 
 
 @dataclass(frozen=True)
 class BoundedMedium:
-    """A homogeneous medium within convex bounds (`realtime.scene.convex_bounds`)."""
+    """A homogeneous medium within convex bounds (`realtime.scene.closed_mesh`)."""
 
     medium: Homogeneous
     planes: Any  #: four numbers a half space: its outward normal, and its distance from `centre` [m]; None for a sphere
     count: int  #: half spaces
     centre: Any  #: of the sphere, or of one that holds the medium [m]
     radius: Any  #: of that sphere [m]
-    mean_distance: Any  #: R, see `realtime.scene.convex_bounds.mean_distance` [m]
+    mean_distance: Any  #: R, see `realtime.scene.closed_mesh.mean_distance` [m]
     neighbours: Any = None  #: `sides` numbers a half space: planes that share an edge with it, or itself; None: sphere
     beside: Any = None  #: `planes` of the neighbours
     sides: int = 0
-    starts: Any = None  #: by cell of directions a half space, see `realtime.scene.convex_bounds.radial_planes`
+    starts: Any = None  #: by cell of directions a half space, see `realtime.scene.closed_mesh.radial_planes`
 
 
 @dataclass

@@ -6,8 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.bounds import cloud_surfaces, next_crossing
-from realtime.clouds.march import depths_along, segment_through
+from realtime.clouds.march import cloud_surfaces, depths_along, next_crossing, segment_through
 from realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_as_printed, opacity_of
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene

@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 
 import realtime.methods.cloud_collectors as method
-from realtime.clouds.bounds import cloud_surfaces
 from realtime.clouds.collector_search import Search
-from realtime.clouds.light_depths import light_depths
-from realtime.clouds.lit_surface import dense_surface
-from realtime.clouds.march import depths_along, segment_through
+from realtime.clouds.density_maps import dense_surface, light_depths
+from realtime.clouds.march import cloud_surfaces, depths_along, segment_through
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import read_scene

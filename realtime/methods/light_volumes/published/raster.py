@@ -31,7 +31,7 @@ References
 Billeter, Sintorn, Assarsson 2010, *Real time volumetric shadows using polygonal light volumes*, HPG 2010. Olano, Greer
 1997, *Triangle scan conversion using 2D homogeneous coordinates*, Graphics Hardware.
 
-The airlight of a light volume: a signed sum over the crossings of camera rays with its boundary.
+**The airlight of a light volume:** a signed sum over the crossings of camera rays with its boundary.
 
 With J(x) the airlight of a lit ray up to x, a ray has the airlight sum_k s_k J(x_k), s = +1 where it leaves the light
 and -1 where it enters it (Billeter, Sintorn, Assarsson 2010, eq. 3). The order does not matter. The visible surface is

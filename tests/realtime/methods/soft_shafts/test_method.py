@@ -9,7 +9,7 @@ import pytest
 from realtime.frame import renderer
 from realtime.frame.renderer import render_frame
 from realtime.image_filters import Raster, depth_guide
-from realtime.methods.soft_shafts.surfaces import AUTO_WIDTH, few_pixels, penumbra_width
+from realtime.methods.soft_shafts.sources import AUTO_WIDTH, few_pixels, penumbra_width
 from realtime.numerics.array_types import two_numbers
 from realtime.scene.read_scene import read_scene
 from tests.helpers.frames import frame, relative_rmse

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realtime.numerics.array_types import aligned_array, array_types
-from realtime.scene.convex_bounds import Bounds, holds, mean_distance, mesh_bounds
+from realtime.scene.closed_mesh import Bounds, holds, mean_distance, mesh_bounds
 from realtime.scene.media.light_paths import LightPaths
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import Isotropic
