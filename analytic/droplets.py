@@ -19,8 +19,8 @@ times too little. `Optics.printed_extinction` is the printed value.
 **Sizes.** With u = r/r_n both averages have the weight u^(gamma + 1) exp(-u). The rule is the midpoint rule between the
 quantiles 1e-9 and 1 - 1e-9 of this weight. A sphere without absorption has resonances too narrow for any rule: the rule
 samples them at random, and the error falls as slowly as the number of sizes grows. The sizes of the rule are therefore
-part of the definition of a phase function here, and `realtime.droplets` takes the same sizes; `SIZES` says how more
-sizes differ.
+part of the definition of a phase function here, and `realtime.droplets` takes the same sizes; `SIZES` says what more
+sizes would change.
 
 **Phase function.** |S_1|^2 + |S_2|^2 of a sphere of N terms is a polynomial of degree 2 N - 1 at most in the cosine: 2
 S_1 and S_2 are sums of pi_n and tau_n, polynomials of degree n - 1 and n, and products of two of these have at most
