@@ -95,7 +95,8 @@ def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
     from reports.tables.drawing import csv
     from reports.tables.table import Column, table
 
-    return csv(table("", [Column(name, name) for name in columns], list(zip(*columns.values()))))
+    filled = {name: values for name, values in columns.items() if any(value is not None for value in values)}
+    return csv(table("", [Column(name, name) for name in filled], list(zip(*filled.values()))))
 
 
 def with_environment(**data: Any) -> dict[str, Any]:
