@@ -111,7 +111,7 @@ def write_report(
             ended = _try_own(names[0], study, process) if names else {}
             for name, parts, span in zip(names, of_scenes, spans):
                 # One scene at a time: Mitsuba compiles a virtual call for the materials, media and lights of all scenes
-                # that are loaded. Beside ten others a batch of volpath takes eight times as long.
+                # that are loaded. A batch of volpath takes eight times as long with ten others.
                 gc.collect()
                 each = opened(name)
                 step = part_of(progress, *span, before=f"{each.name}: ")
