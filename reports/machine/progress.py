@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A progress bar with the time left, on the error stream; plain lines where that is no terminal."""
 
-import math
-import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -12,40 +10,73 @@ Progress = Callable[[float, str], None]
 Steps = Callable[[int, int, str], None]  # (done, total, what)
 
 _PATIENCE = 2.0  # seconds before anything is shown
-_EVERY, _PLAIN_EVERY = 0.1, 10.0  # seconds between two states on a terminal, and between the lines of a plain stream
-_BAR, _ERASE = 20, "\r\x1b[2K"  # width of the bar, and the code that empties a line of a terminal
+_PLAIN_EVERY = 10.0  # seconds between the lines of a plain stream
 
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Progress]:
     """Yield a function (fraction done, what) that shows the progress of the work and the time left.
 
-    Work that ends within two seconds shows nothing. A terminal has one line, which goes away at the end.
+    Work that ends within two seconds shows nothing.
     """
-    terminal = sys.stderr.isatty()
-    start, last = time.monotonic(), -math.inf
+    if sys.stderr.isatty():
+        yield from _rich_bar(title)
+    else:
+        yield _plain_lines(title)
+
+
+def _rich_bar(title: str) -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from reports.tables.record import colours_wanted
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=30),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}{task.fields[what]}"),
+    )
+    start = time.monotonic()
+    console = Console(stderr=True, color_system="auto" if colours_wanted() else None)
+    bar = Progress(*columns, console=console, transient=True)  # it prints messages of others above itself
+    task = bar.add_task(title, total=1.0, what="", left="")
+    shown = False
 
     def progress(fraction: float, what: str) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - start < _PATIENCE or now - last < (_EVERY if terminal else _PLAIN_EVERY):
-            return
-        last = now
-        # The mean pace of all work decides: by that of the last minute one long part would make the estimate jump.
-        left = f"about {_clock((now - start) * (1 - fraction) / fraction)} left, " if fraction > 0 else ""
-        words = f"{100 * fraction:.0f} %, {left}{what}"
-        if not terminal:
-            print(f"{title}: {words}", file=sys.stderr, flush=True)
-            return
-        bar = "#" * int(_BAR * fraction)
-        line = f"{title} [{bar:{_BAR}}] {words}"[: shutil.get_terminal_size().columns - 1]
-        print(f"{_ERASE}{line}", end="\r", file=sys.stderr, flush=True)  # other messages begin at the left
+        nonlocal shown
+        elapsed = time.monotonic() - start
+        if not shown and elapsed > _PATIENCE:
+            shown = True
+            bar.start()
+            console.show_cursor(True)  # Rich hides it, and Ctrl-C ends the process before it would show it again
+        bar.update(task, completed=fraction, what=what, left=_left(elapsed, fraction))
 
     try:
         yield progress
     finally:
-        if terminal and last > start:
-            print(_ERASE, end="", file=sys.stderr, flush=True)
+        if shown:
+            bar.stop()
+
+
+def _plain_lines(title: str) -> Progress:
+    start = last = time.monotonic()
+
+    def progress(fraction: float, what: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - start < _PATIENCE or now - last < _PLAIN_EVERY:
+            return
+        last = now
+        print(f"{title}: {100 * fraction:.0f} %, {_left(now - start, fraction)}{what}", file=sys.stderr, flush=True)
+
+    return progress
+
+
+def _left(elapsed: float, fraction: float) -> str:
+    """Return the time left at the mean pace of all work; by the last half minute, one long part makes it jump."""
+    return f"about {_clock(elapsed * (1 - fraction) / fraction)} left, " if fraction > 0 else ""
 
 
 def _clock(seconds: float) -> str:

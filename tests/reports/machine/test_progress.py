@@ -36,6 +36,7 @@ class Terminal(io.StringIO):
 def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(monkeypatch, clock, seconds, shown):
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("COLUMNS", "120")
     with progress_bar("report") as progress:
         clock.now += seconds
@@ -44,6 +45,6 @@ def test_bar_on_a_terminal_appears_after_two_seconds_and_goes_away(monkeypatch, 
     assert ("open-fog: volpath" in text) is shown
     assert ("25 %" in text) is shown
     if shown:
-        assert text.endswith("\r\x1b[2K")  # the line is erased at the end
+        assert text.endswith("\x1b[2K")  # the line is erased at the end
     else:
         assert text == ""
