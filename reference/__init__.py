@@ -8,8 +8,8 @@ integrator of Mitsuba. `monte_carlo.volpath` runs Mitsuba's volumetric path trac
 None of the three imports another. They share the reading of the scene (`scene`: coefficients, lights,
 the rays through pixel centres, as Mitsuba gives them), the class of errors for the user, and, in the two that
 sample, the means over batches. Reading a scene is no derivation; all that is derived from these facts, from the planes
-of directional lights to the crossings of bounds, belongs to one estimator alone. `tests/test_independence.py` follows
-all imports to their end and holds this list.
+of directional lights to the crossings of bounds, belongs to one estimator alone. The contracts of import-linter in
+`pyproject.toml` follow all imports and hold this list.
 
 Read in this order:
 

@@ -69,8 +69,11 @@ def read_height_fog(medium, albedo: Array, phase: PhaseFunction) -> HeightMedium
     """Read height fog; its albedo, RGB, and its phase function were read."""
     parameters = mi.traverse(medium)
     scale = float(parameters["scale"])
-    keys = [key for key in parameters.keys() if key.startswith("sigma_t.")]  # noqa: SIM118 - of pairs
-    number = {key.rpartition(".")[2]: np.array(parameters[key], dtype=np.float64).ravel() for key in keys}
+    number = {
+        key.rpartition(".")[2]: np.array(value, dtype=np.float64).ravel()
+        for key, value in parameters
+        if key.startswith("sigma_t.")
+    }
     layers = tuple(
         (scale * sigma_t, float(number[f"z_{i}"][0]), float(number[f"H_{i}"][0]))
         for i in "12"

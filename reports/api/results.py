@@ -258,7 +258,9 @@ class Reference(LayeredImage):
         if isinstance(self.how, MonteCarloReference):
             data |= {name: getattr(self.how, name) for name in ("cached", "damaged", "masked", "reached")}
             data |= {f"{name}_error": error for name, error in self.how.errors.items()}
-        return plain(data if self.how is None or "cached" in data else data | asdict(self.how))
+        elif self.how is not None:
+            data |= asdict(self.how)
+        return plain(data)
 
     @property
     def passed(self) -> bool:

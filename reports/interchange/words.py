@@ -122,5 +122,5 @@ def _outcome(path: Path, folder: Path) -> FileOutcome:
         return FileOutcome(name, "taken", "; ".join(dict.fromkeys(notes)))
     except (InputError, RealtimeInputError) as reason:
         return FileOutcome(name, "refused", str(reason).replace(str(path), path.name))
-    except Exception as error:  # a fault of the program, which a log of many files shall show and outlive
+    except Exception as error:  # a fault of the program in one file: the log says it and goes on with the next
         return FileOutcome(name, "failed", f"{type(error).__name__}: {' '.join(str(error).split())}")

@@ -14,7 +14,7 @@ from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from validation.kernels.records import Stability
-from validation.papers.claims import EFFORTS, Claim, Judged, claims, experiments, judged, run_experiment
+from validation.papers.claims import EFFORTS, Claim, Judged, claims, experiments, judged
 from validation.study.configuration import Configuration, user_code
 from validation.study.study import Study, standard_study
 from validation.timing import Scaling
@@ -111,13 +111,13 @@ def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[s
     """Return the names of the experiments that claims need and that an effort has."""
     needed = {claim.experiment for claim in chosen}
     most = EFFORTS.index(effort)
-    return [name for name, each in experiments().items() if name in needed and EFFORTS.index(each["effort"]) <= most]
+    return [name for name, each in experiments().items() if name in needed and EFFORTS.index(each.effort) <= most]
 
 
 def _paper(name: str) -> OtherPart:
     experiment = experiments()[name]
-    module = f"validation.papers.{experiment['function'].partition(':')[0]}"
-    return OtherPart("papers", name, experiment["seconds"], _experiment, (name, source_digest(module), machine()))
+    module = f"validation.papers.{experiment.function.partition(':')[0]}"
+    return OtherPart("papers", name, experiment.seconds, _experiment, (name, source_digest(module), machine()))
 
 
 @kept("report-paper", "validation.papers.claims")
@@ -126,7 +126,7 @@ def _experiment(
 ) -> tuple[str, dict[str, Any]]:
     """Return the name of an experiment and its figures; `source` is the digest of its module."""
     progress(0.0, "claims of papers")
-    return name, run_experiment(name)
+    return name, experiments()[name].run()
 
 
 def paper_rows(results: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Judged]:

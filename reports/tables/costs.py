@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Costs as tables: of kernels, also the cheapest at each error and where they break; of methods as their work grows."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from reports.tables.table import Column, Measured, Name, Row, Table, Value, measured, numbers, table, words
-from validation.kernels.records import KernelCost, Rays, RayTime, Stability
+from validation.kernels.records import ErrorLevel, KernelCost, Rays, RayTime, Stability
 from validation.timing import Scaling
 
 COSTS = (
@@ -19,7 +19,7 @@ COSTS = (
 _STATISTICS = {"max": "maximum error", "p99": "99 % of the rays"}
 
 
-def kernel_tables(costs: Iterable[KernelCost], levels: Iterable[Mapping[str, Any]]) -> Iterator[Table]:
+def kernel_tables(costs: Iterable[KernelCost], levels: Iterable[ErrorLevel]) -> Iterator[Table]:
     """Yield for each phase function the table of costs and the tables of the cheapest kernels at each error."""
     costs, levels = list(costs), list(levels)
     for phase in dict.fromkeys(cost.phase for cost in costs):
@@ -27,7 +27,7 @@ def kernel_tables(costs: Iterable[KernelCost], levels: Iterable[Mapping[str, Any
         g = f", g = {chosen[0].g:g}" if phase == "hg" else ""
         yield cost_table(f"{phase}{g}, float32, wide rays", chosen)
         for statistic, phrase in _STATISTICS.items():
-            rows = [level for level in levels if (level["phase"], level["statistic"]) == (phase, statistic)]
+            rows = [level for level in levels if (level.phase, level.statistic) == (phase, statistic)]
             yield level_table(f"{phase}: speed against error, {phrase}", rows)
 
 
@@ -48,10 +48,10 @@ def _spread(time: RayTime | None) -> Measured | None:
     return Measured(time.median, time.low, time.high) if time else None
 
 
-def level_table(title: str, levels: Iterable[Mapping[str, Any]]) -> Table:
+def level_table(title: str, levels: Iterable[ErrorLevel]) -> Table:
     """Return which kernel is cheapest at each error."""
     columns = (Column("level", "error", digits=6), *words("cheapest"), Column("ns", "", "ns/ray"))
-    return table(title, columns, [(each["level"], each["cheapest"] or "none", each["ns"]) for each in levels])
+    return table(title, columns, [(each.level, each.cheapest or "none", each.ns) for each in levels])
 
 
 def stability_summary(found: Iterable[Stability]) -> Table:

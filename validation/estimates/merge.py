@@ -9,6 +9,7 @@ rounding alone shows as a relative standard error of the order of 6e-8, where th
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +27,17 @@ _SAME = {
 }
 
 
-Part = tuple[str, Image, tuple[int, ...]]  # name of the file, its layers, its seeds
+@dataclass(frozen=True)
+class _Part:
+    name: str  # of the file
+    image: Image
+    seeds: tuple[int, ...]
+
+    def moments(self, layer: str) -> tuple[int, Array, Array]:
+        """Return the number of batches, their mean and the sum of their squared deviations."""
+        count = len(self.seeds)
+        mean, error = (np.asarray(self.image.layers[name], dtype=np.float64) for name in (layer, f"{layer}_se"))
+        return count, mean, error**2 * (count * (count - 1))
 
 
 def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
@@ -37,47 +48,38 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     """
     if len(files) < 2:
         raise InputError(f"got {len(files)} file to merge; wanted at least two")
-    parts = sorted((_read(name, image) for name, image in files), key=lambda part: part[2])
+    parts = sorted((_read(name, image) for name, image in files), key=lambda part: part.seeds)
     for part in parts[1:]:
         _check_same(parts[0], part)
     seeds = _all_seeds(parts)
-    first = parts[0][1]
-    held = [frozenset(image.layers) for _, image, _ in parts]
+    held = [frozenset(part.image.layers) for part in parts]
     if any(names != held[0] for names in held):
         odd = sorted(held[0].union(*held) - held[0].intersection(*held))
         raise InputError(
             f"the files to merge differ in their layers: {', '.join(odd)}; make all with the same --orders"
         )
     # Those without a standard error are the same in all files; the total is written again.
-    layers = {name: values for name, values in first.layers.items() if name != TOTAL}
+    layers = {name: values for name, values in parts[0].image.layers.items() if name != TOTAL}
     for layer in [name for name in layers if f"{name}_se" in layers]:
-        count, mean, squares = _moments(parts[0], layer)
+        count, mean, squares = parts[0].moments(layer)
         for part in parts[1:]:
-            other = _moments(part, layer)
+            other = part.moments(layer)
             mean, squares = combined_moments((count, mean, squares), other)
             count += other[0]
         layers[layer] = mean
         layers[f"{layer}_se"] = np.sqrt(squares / (count * (count - 1)))
-    samples = int(first.attributes["airlight:batch_spp"])
-    attributes: dict[str, Attribute] = dict(first.attributes) | {
+    samples = int(parts[0].image.attributes["airlight:batch_spp"])
+    attributes: dict[str, Attribute] = dict(parts[0].image.attributes) | {
         "airlight:spp": samples * len(seeds),
         "airlight:batches": len(seeds),
         "airlight:seed": seeds[0],
         "airlight:seeds": seed_ranges(seeds),
         "airlight:merged": len(parts),
     }
-    return Image(layers, first.depth, attributes)
+    return Image(layers, parts[0].image.depth, attributes)
 
 
-def _moments(part: Part, layer: str) -> tuple[int, Array, Array]:
-    """Return the number of batches, their mean and the sum of their squared deviations."""
-    _, image, seeds = part
-    count = len(seeds)
-    mean, error = (np.asarray(image.layers[name], dtype=np.float64) for name in (layer, f"{layer}_se"))
-    return count, mean, error**2 * (count * (count - 1))
-
-
-def _read(name: str, image: Image) -> Part:
+def _read(name: str, image: Image) -> _Part:
     """Check that a file is a reference with batches."""
     header = image.attributes
     missing = [key for key in ("estimator", "scene_digest", "batch_spp", "batches", "seeds") if not _of(header, key)]
@@ -97,38 +99,37 @@ def _read(name: str, image: Image) -> Part:
         raise InputError(
             f"{name}: its header names {len(seeds)} seeds and {_of(header, 'batches')} batches; compute it again"
         )
-    return name, image, seeds
+    return _Part(name, image, seeds)
 
 
 def _of(header: Mapping[str, Attribute], key: str) -> str:
     return str(header.get(f"airlight:{key}", ""))
 
 
-def _check_same(first: Part, second: Part) -> None:
-    names, images = (first[0], second[0]), (first[1], second[1])
+def _check_same(first: _Part, second: _Part) -> None:
     for key, meaning in _SAME.items():
-        values = [_of(image.attributes, key) for image in images]
+        values = [_of(part.image.attributes, key) for part in (first, second)]
         if values[0] != values[1]:
             raise InputError(
-                f"{names[0]} and {names[1]} differ in {meaning} ({values[0][:24]} and {values[1][:24]}); "
+                f"{first.name} and {second.name} differ in {meaning} ({values[0][:24]} and {values[1][:24]}); "
                 "merge references that were made alike"
             )
-    shapes = [image.layers[LAYERS[0]].shape for image in images]
+    shapes = [part.image.layers[LAYERS[0]].shape for part in (first, second)]
     if shapes[0] != shapes[1]:
         raise InputError(
-            f"{names[0]} and {names[1]} have images of two sizes, {shapes[0][1::-1]} and {shapes[1][1::-1]}"
+            f"{first.name} and {second.name} have images of two sizes, {shapes[0][1::-1]} and {shapes[1][1::-1]}"
         )
 
 
-def _all_seeds(parts: Sequence[Part]) -> list[int]:
+def _all_seeds(parts: Sequence[_Part]) -> list[int]:
     """Return all seeds, ascending; the same batch twice would count as two."""
     owner: dict[int, str] = {}
-    for name, _, seeds in parts:
-        shared = [seed for seed in seeds if seed in owner]
+    for part in parts:
+        shared = [seed for seed in part.seeds if seed in owner]
         if shared:
             raise InputError(
-                f"{owner[shared[0]]} and {name} share the seeds {seed_ranges(shared)}; "
+                f"{owner[shared[0]]} and {part.name} share the seeds {seed_ranges(shared)}; "
                 "compute one of them again with another --seed"
             )
-        owner |= dict.fromkeys(seeds, name)
+        owner |= dict.fromkeys(part.seeds, part.name)
     return sorted(owner)

@@ -29,7 +29,7 @@ from validation.clock import time_repeated, timing_of
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE, Kernel, relative_error
 from validation.kernels.rays import wide_rays
-from validation.kernels.records import KernelCost, RayTime
+from validation.kernels.records import ErrorLevel, KernelCost, RayTime
 from validation.study.configuration import find_kernel, sized, split_name
 
 RAYS = 480_000  # 800 x 600
@@ -93,8 +93,8 @@ def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, se
     return replace(cost, rays=rays, device=device, wall=wall, median=median, p99=p99, max=largest, nonfinite=nonfinite)
 
 
-def speed_against_error(costs: Sequence[KernelCost]) -> list[dict[str, Any]]:
-    """Return for each `phase` function, `statistic` and error `level` the `cheapest` kernel and its cost [`ns` a ray].
+def speed_against_error(costs: Sequence[KernelCost]) -> list[ErrorLevel]:
+    """Return the cheapest kernel, and its cost [ns a ray], for each phase function, statistic and error level.
 
     A kernel reaches a level if its error stays at or below it; one that gave values that are not finite reaches none.
     """
@@ -102,8 +102,8 @@ def speed_against_error(costs: Sequence[KernelCost]) -> list[dict[str, Any]]:
     for phase, statistic, level in product(dict.fromkeys(cost.phase for cost in costs), ("max", "p99"), LEVELS):
         good = [cost for cost in costs if cost.phase == phase and _reaches(cost, statistic, level)]
         best = min(good, key=_ns, default=None)
-        row: dict[str, Any] = {"phase": phase, "statistic": statistic, "level": level}
-        levels.append(row | {"cheapest": best and best.kernel, "ns": best and _ns(best)})
+        cheapest, ns = (best.kernel, _ns(best)) if best else (None, None)
+        levels.append(ErrorLevel(phase=phase, statistic=statistic, level=level, cheapest=cheapest, ns=ns))
     return levels
 
 

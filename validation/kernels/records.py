@@ -79,3 +79,14 @@ class KernelCost:
     def time(self) -> RayTime | None:
         """The time by which kernels are compared: the device's where it is known."""
         return self.device or self.wall
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorLevel:
+    """The cheapest kernel at an error."""
+
+    phase: str
+    statistic: str  #: 'max' or 'p99'
+    level: float
+    cheapest: str | None
+    ns: float | None  #: of a ray

@@ -77,6 +77,20 @@ class Claim:
         return words + (f" to {100 * self.tolerance:g} %" if self.tolerance > 1e-6 else "")
 
 
+@dataclass(frozen=True)
+class Experiment:
+    """A function that measures the figures of some claims."""
+
+    function: str  #: of a module beside this one, 'module:function'; called without arguments it gives the figures
+    seconds: float  #: that it takes on two threads, about
+    effort: str = EFFORTS[-1]  #: the least of `EFFORTS` whose reports have it; 'paper': only the command
+
+    def run(self) -> dict[str, Any]:
+        """Return the `Figures`."""
+        module, function = self.function.split(":")
+        return getattr(importlib.import_module(f"validation.papers.{module}"), function)()
+
+
 @cache
 def _data() -> dict[str, Any]:
     return tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
@@ -88,15 +102,9 @@ def papers() -> dict[str, str]:
 
 
 @cache
-def experiments() -> dict[str, dict[str, Any]]:
-    """Return the experiments by name: `function`, `seconds` and `effort`, see the file."""
-    return {name: {"effort": EFFORTS[-1], **given} for name, given in _data()["experiments"].items()}
-
-
-def run_experiment(name: str) -> dict[str, Any]:
-    """Return the `Figures` of an experiment."""
-    module, function = experiments()[name]["function"].split(":")
-    return getattr(importlib.import_module(f"validation.papers.{module}"), function)()
+def experiments() -> dict[str, Experiment]:
+    """Return the experiments by name."""
+    return {name: Experiment(**given) for name, given in _data()["experiments"].items()}
 
 
 @cache

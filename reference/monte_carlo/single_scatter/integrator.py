@@ -2,9 +2,8 @@
 """`single-scatter`: batches of an estimator of exactly one scattering, in the medium or on a surface.
 
 `reference.monte_carlo.single_scatter.estimator` has the integral along a ray and its estimate. The integrator checks
-`reference.quadrature`. The two share the rays through the pixel centres, which `reference.scene` reads as facts of the
-scene, and Mitsuba's ray casting; no derivation beyond the integral itself (`tests/test_independence.py` follows the
-imports to their end).
+`reference.quadrature`. The two share facts that `reference.scene` reads (rays through the pixel centres, shapes and
+radiance of area lights, numbers of media) and Mitsuba's ray casting, but no derivation beyond the integral itself.
 
 The n samples of a ray lie in n cells of the unit interval, each at a random place of its cell; the grid of cells is
 itself at a random place, a new one for each light and medium. The estimate is unbiased, its error falls as n^-1.5

@@ -236,24 +236,24 @@ COSTS = (
 
 
 def level(levels, statistic, value):
-    return next(each for each in levels if (each["statistic"], each["level"]) == (statistic, value))
+    return next(each for each in levels if (each.statistic, each.level) == (statistic, value))
 
 
 def test_cheapest_kernel_of_each_level():
     levels = speed_against_error(COSTS)
     assert len(levels) == 12
     coarse, fine, finest = (level(levels, "max", value) for value in (1e-1, 1e-2, 1e-6))
-    assert (coarse["cheapest"], coarse["ns"]) == ("table-64", 4.0)
-    assert fine["cheapest"] == "quadrature-8"
-    assert (finest["cheapest"], finest["ns"]) == (None, None)
+    assert (coarse.cheapest, coarse.ns) == ("table-64", 4.0)
+    assert fine.cheapest == "quadrature-8"
+    assert (finest.cheapest, finest.ns) == (None, None)
     # 99 % of the rays are ten times better here.
-    assert level(levels, "p99", 1e-2)["cheapest"] == "table-64"
-    assert level(levels, "p99", 1e-6)["cheapest"] == "quadrature-16"
+    assert level(levels, "p99", 1e-2).cheapest == "table-64"
+    assert level(levels, "p99", 1e-6).cheapest == "quadrature-16"
 
 
 def test_values_that_are_not_finite_reach_no_level():
     fast = cost("taylor", 4, 1.0, 1e-7, nonfinite=1)
-    assert level(speed_against_error([*COSTS, fast]), "max", 1e-1)["cheapest"] == "table-64"
+    assert level(speed_against_error([*COSTS, fast]), "max", 1e-1).cheapest == "table-64"
 
 
 def test_measured_errors_and_times_are_those_of_the_kernel(variant):

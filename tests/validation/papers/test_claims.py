@@ -22,7 +22,6 @@ from validation.papers.claims import (
     experiments,
     judged,
     papers,
-    run_experiment,
     taken,
     verdict,
 )
@@ -67,7 +66,7 @@ def test_every_claim_is_whole():
     assert {each.paper for each in claims()} == set(papers())
     assert len({key(each) for each in claims()}) == len(claims())
     assert {each.experiment for each in claims() if each.experiment} == set(experiments())
-    assert {each["effort"] for each in experiments().values()} == set(EFFORTS)
+    assert {each.effort for each in experiments().values()} == set(EFFORTS)
     for each in claims():
         assert each.figure if each.experiment else each.why and not each.direction, each.item
         if each.direction:
@@ -165,12 +164,10 @@ def test_what_a_constant_leaves_of_two_noisy_images():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [name for name, each in experiments().items() if each["effort"] in ("quick", "default")]
-)
+@pytest.mark.parametrize("name", [name for name, each in experiments().items() if each.effort in ("quick", "default")])
 def test_experiments_have_the_recorded_verdicts(variant, name):
     """Verdicts on the machine or on our scenes are not compared: they are those of the machine at hand."""
-    figures = run_experiment(name)
+    figures = experiments()[name].run()
     for each in JUDGED:
         if each.experiment == name:
             figure = taken(each, figures)
