@@ -82,7 +82,7 @@ class Comparison:
         if self.statistics is not None:
             lines += statistics_lines(self.statistics)
         more: dict[str, Any] = {"other tools": self.errors, "over the mean": self.errors_normalised}
-        more |= {"colour": self.colour, "HDR-FLIP": self.flip}
+        more |= {"colour": self.colour, "FLIP": self.flip}
         lines += [line for name, record in more.items() if record is not None for line in record_lines(name, record)]
         lines += [order_line(each.layer, each.metrics, each.statistics) for each in self.orders]
         lines += [f"file             {note}" for note in self.notes]
@@ -231,8 +231,8 @@ def record_lines(name: str, record: Any) -> list[str]:
     for each in columns_of(record.__class__):
         value = values[each.key]
         if value is not None and value != "":
-            number = value if isinstance(value, str) else shown(value)
-            words.append(f"{each.heading} {number}" + (f" {each.unit}" if each.unit not in ("", "1") else ""))
+            number = shown(value) if isinstance(value, float) else str(value)
+            words.append(f"{each.heading} {number}" + ("" if each.unit in ("", "1", each.heading) else f" {each.unit}"))
     return textwrap.wrap("; ".join(words), 117, initial_indent=f"{name:<17}", subsequent_indent=" " * 17)
 
 
