@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,8 @@ class ImageComparison(Comparison, Pictured):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight compare --json` prints."""
-        return self.to_json() | _differences(self.files)
+        numbers = {each.name: getattr(self, each.name) for each in fields(Comparison)}
+        return plain(numbers) | _differences(self.files)
 
     @property
     def lines(self) -> Sequence[str]:
@@ -122,10 +123,10 @@ class SceneComparison(Said):
 def scene_comparison(compared: EngineComparison, files: Sequence[tuple[str, str]] = ()) -> SceneComparison:
     """Return a comparison as a result; `files` are differences that were written, and what they show."""
     return SceneComparison(
-        name=f"{compared.layer} of {compared.path} against {compared.scene}",
-        data=compared.to_json() | _differences(files),
+        name=f"{compared.comparison.layer} of {compared.path} against {compared.scene}",
+        data=plain(compared) | _differences(files),
         lines=[*compared.summary().split("\n"), *_difference_lines(files)],
-        good=not compared.failures,
+        good=not compared.comparison.failures,
         of=compared,
     )
 

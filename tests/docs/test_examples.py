@@ -229,7 +229,7 @@ def test_an_engine_that_knows_the_description_alone_is_called_right(
     assert run(["compare", scene, str(image), *layer, "--json"]) == 0
     compared = json.loads(capsys.readouterr().out)
     assert compared["verdict"]["right"], compared["verdict"]["reasons"]
-    assert abs(compared["factor"] - 1) < 0.005
+    assert abs(compared["hints"]["factor"] - 1) < 0.005
 
 
 @pytest.mark.slow

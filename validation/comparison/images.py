@@ -16,7 +16,7 @@ from analytic.errors import InputError
 from reference.storage.exr import NOTE, TOTAL, Image, layer_names, read_exr
 from reference.storage.exr import layer as image_layer
 from validation.arrays import Bools
-from validation.columns import columns_of, plain, shown_values
+from validation.columns import columns_of, shown_values
 from validation.metrics.colour import ColourDifference, colour_difference
 from validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
 from validation.metrics.flip import Flip, flip_hdr
@@ -36,36 +36,14 @@ class Comparison:
     metrics: Metrics  #: of all pixels that the mask leaves
     statistics: Statistics | None  #: None where neither image has standard errors
     masked: int = 0  #: pixels that the mask leaves out
-    wrong: tuple[str, ...] = ()  #: how many pixels are not finite, or negative, and where the first of them is
     errors: PublishedErrors | None = None  #: as other tools print them
     errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
     colour: ColourDifference | None = None  #: None if it was not asked for
     flip: Flip | None = None  #: None if it was not asked for
     orders: tuple["Comparison", ...] = ()  #: of the layers by order of scattering that both images have
     notes: tuple[str, ...] = ()  #: what was changed or left out when files were read
-
-    @property
-    def failures(self) -> tuple[str, ...]:
-        """Why the comparison must be called failed; empty if it is not."""
-        reasons = list(self.wrong)
-        if self.statistics is not None and self.statistics.equivalent is False:
-            reasons.append(f"the relative bias is not shown to be within +-{self.statistics.margin:.3g}")
-        reasons += [f"{each.layer}: {reason}" for each in self.orders for reason in each.failures]
-        return tuple(reasons)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name, those of the metrics first; what is not finite is None.
-
-        The metrics of other tools, the colour differences and FLIP are in objects of their own, where asked for.
-        `relative_bias` is the same in the metrics and in the statistics, sum(test - ref) / sum(ref).
-        """
-        statistics = {} if self.statistics is None else plain(self.statistics)
-        names = ("errors", "errors_normalised", "colour", "flip")
-        extras = {name: plain(value) for name in names if (value := getattr(self, name)) is not None}
-        flat = {"layer": self.layer, **statistics, **plain(self.metrics), "masked": self.masked}
-        by_order = {"orders": [each.to_json() for each in self.orders]} if self.orders else {}
-        notes = {"notes": list(self.notes)} if self.notes else {}
-        return {**flat, **extras, **by_order, **notes, "failures": list(self.failures)}
+    #: Why the comparison must be called failed: pixels that are not finite or negative, a bias beyond the margin.
+    failures: tuple[str, ...] = ()
 
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
@@ -118,10 +96,12 @@ def compare_images(
     whole = _compared(named, name, chosen, margin, all_metrics=all_metrics)
     orders = [each for each in reference.layers if _ORDER.fullmatch(each) and each in test.layers]
     orders = sorted(orders, key=lambda each: int(each.split("_")[1])) if name == "airlight" else []
+    by_order = tuple(_compared(named, each, chosen) for each in orders)
     return replace(
         whole,
+        orders=by_order,
         notes=tuple(f"{path}: {image.attributes[NOTE]}" for path, image in named if NOTE in image.attributes),
-        orders=tuple(_compared(named, each, chosen) for each in orders),
+        failures=whole.failures + tuple(f"{each.layer}: {why}" for each in by_order for why in each.failures),
     )
 
 
@@ -142,15 +122,15 @@ def _compared(
     images: tuple[ArrayLike, ArrayLike] = (expected.mean, tested.mean)
     ref, tst, chosen = compared(*images, mask)
     finite = (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
-    wrong = (
-        *wrong_pixels(chosen & ~finite, "NaN or infinite"),
-        *wrong_pixels(chosen & (tst < 0).any(axis=2), "negative in the test image"),
-    )
+    failures = wrong_pixels(chosen & ~finite, "NaN or infinite")
+    failures += wrong_pixels(chosen & (tst < 0).any(axis=2), "negative in the test image")
+    if statistics is not None and statistics.equivalent is False:
+        failures += (f"the relative bias is not shown to be within +-{margin:.3g}",)
     return Comparison(
         layer,
         metrics,
         statistics,
-        wrong=wrong,
+        failures=failures,
         masked=0 if mask is None else int((~np.asarray(mask)).sum()),
         errors=published_errors(*images, mask=mask) if all_metrics else None,
         errors_normalised=published_errors(*images, mask=mask, unit=None) if all_metrics else None,

@@ -37,13 +37,11 @@ from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import read_reference
 from reference.storage.exr import NOTE, TOTAL, Image, read_exr
 from validation.arrays import Array, Bools, Progress
-from validation.columns import plain
 from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
 from validation.engine.error_place import ErrorPlace, error_place
 from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
 from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import (
-    PIXELS,
     PixelKind,
     decide_pixel,
     pixel_kinds,
@@ -69,20 +67,16 @@ _EXACT = 1e-3  # relative error of an image that fits the centres so well that n
 class Verdict:
     """Whether an image is right."""
 
+    right: bool
     reasons: tuple[str, ...]  #: why it is not; empty if it is
     block: int  #: side of a block [pixels]
     block_error: float  #: relative error of block means; NaN where no block is lit
     block_noise: float  #: what the scatter of the pixels within them explains of it
 
     @property
-    def right(self) -> bool:
-        """Whether the image is right."""
-        return not self.reasons
-
-    @property
     def words(self) -> str:
         """Return a sentence."""
-        if self.reasons:
+        if not self.right:
             return f"not right: {'; '.join(self.reasons)}"
         size = "single pixels" if self.block == 1 else f"means over {self.block} x {self.block} pixels"
         return f"right: {size} are within {100 * self.block_error:.2g} % (noise {100 * self.block_noise:.2g} %)"
@@ -105,54 +99,14 @@ class EngineComparison:
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
     verdict: Verdict
     note: str  #: what the reader of the file changed or left out
-    margin: float | None  #: largest relative bias that counts as agreement
     layers: ReferenceImage = field(repr=False, compare=False)  #: the reference that it was judged by, and its layer
     reference: NDArray[np.floating] = field(repr=False, compare=False)
     image: NDArray[np.floating] = field(repr=False, compare=False)  #: the layer that was judged
 
     @property
-    def layer(self) -> str:
-        """The layer that was judged."""
-        return self.comparison.layer
-
-    @property
     def pixel(self) -> str:
         """Where a pixel of the reference is taken: at its 'centre' or over its 'area'."""
         return self.kind.pixel
-
-    @property
-    def failures(self) -> tuple[str, ...]:
-        """Why the comparison must be called failed; empty if it is not."""
-        bias = self.comparison.metrics.relative_bias
-        reasons = self.comparison.failures
-        if (
-            self.margin is not None
-            and self.comparison.statistics is None
-            and not (bias is not None and abs(bias) <= self.margin)
-        ):
-            told = "undefined" if bias is None else f"{bias:+.3g}"
-            reasons = (*reasons, f"the relative bias, {told}, is not within +-{self.margin:.3g}")
-        return reasons
-
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name, those of `Comparison.to_json` among them."""
-        return {
-            "scene": self.scene,
-            "file": self.path,
-            "size": list(self.size),
-            "pixel": self.pixel,
-            "expected": self.expected,
-            "reference_error": plain(self.reference_error),
-            **self.comparison.to_json(),
-            "factor": plain(self.hints.factor),
-            "factor_rmse": plain(self.hints.factor_rmse),
-            "hints": list(self.hints.words),
-            "pixel_errors": {kind: plain(self.kind.errors.get(kind)) for kind in PIXELS},
-            "where": plain(self.place),
-            "verdict": {"right": self.verdict.right, **plain(self.verdict)},
-            "note": self.note,
-            "failures": list(self.failures),
-        }
 
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
@@ -170,8 +124,6 @@ class EngineComparison:
         lines += [] if self.place is None else [f"where            {self.place.words}"]
         lines += [f"suspect          {words}" for words in self.hints.words]
         lines += [f"file             {self.note}"] if self.note else []
-        own = self.failures[len(self.comparison.failures) :]
-        lines += [f"failed           {reason}" for reason in own]
         return "\n".join([*lines, f"verdict          {self.verdict.words}"])
 
 
@@ -255,6 +207,11 @@ def judge_image(
         margin=margin if with_errors else None,
         **metrics,
     )
+    bias = comparison.metrics.relative_bias
+    if margin is not None and not with_errors and (bias is None or abs(bias) > margin):
+        told = "undefined" if bias is None else f"{bias:+.3g}"
+        words = f"the relative bias, {told}, is not within +-{margin:.3g}"
+        comparison = replace(comparison, failures=(*comparison.failures, words))
     test = judged.values.astype(np.float64)
     return EngineComparison(
         scene=loaded.name,
@@ -268,7 +225,6 @@ def judge_image(
         place=error_place(wanted, test, lamp_distance(loaded, fitting)),
         verdict=judge(wanted, test, hints, comparison.failures),
         note=str(image.attributes.get(NOTE, "")),
-        margin=margin,
         layers=fitting,
         reference=wanted,
         image=image.layers[name],
@@ -382,7 +338,7 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
         size = "single pixels" if side == 1 else f"means over {side} x {side} pixels"
         most = ", most of it noise: render more samples" if noise > error / math.sqrt(2) else ""
         reasons.append(f"{size} are {100 * error:.3g} % off{most}")
-    return Verdict(tuple(reasons), side, error, noise)
+    return Verdict(not reasons, tuple(reasons), side, error, noise)
 
 
 def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:

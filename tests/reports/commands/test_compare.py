@@ -41,8 +41,8 @@ def printed(capsys, *arguments, status=0):
 @pytest.mark.claim("agreement-inside-the-margin", "exit-status")
 def test_the_margin_decides(files, capsys):
     images, _ = files
-    assert printed(capsys, *images, "--margin", "0.03")["equivalent"] is True
-    assert printed(capsys, *images, "--margin", "0.001", status=1)["equivalent"] is False
+    assert printed(capsys, *images, "--margin", "0.03")["statistics"]["equivalent"] is True
+    assert printed(capsys, *images, "--margin", "0.001", status=1)["statistics"]["equivalent"] is False
     assert run(["compare", *images]) == 0
 
 
@@ -53,12 +53,12 @@ def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
     airlight = reference_image(load_scene("open-fog", (32, 24)).scene).airlight
     write_exr(path, Image({"airlight": airlight}))
     values = printed(capsys, "open-fog", str(path), "--margin", "1e-6", "-o", str(difference))
-    assert (values["scene"], values["size"], values["hints"]) == ("open-fog", [32, 24], [])
-    assert values["relative_rmse"] < 1e-6  # the file is float32
+    assert (values["scene"], values["size"], values["hints"]["words"]) == ("open-fog", [32, 24], [])
+    assert values["comparison"]["metrics"]["relative_rmse"] < 1e-6  # the file is float32
     assert np.abs(read_exr(difference).layers["relative"]).max() < 1e-5
     write_exr(path, Image({"total": airlight[::-1]}))
     turned = printed(capsys, "open-fog", str(path), "--margin", "1e-6")  # a turn moves no light
-    assert any("upside down" in hint for hint in turned["hints"])
+    assert any("upside down" in hint for hint in turned["hints"]["words"])
     write_exr(path, Image({"airlight": 1.01 * airlight}))
     printed(capsys, "open-fog", str(path), "--margin", "0.005", status=1)
     write_exr(path, Image({"airlight": airlight[:20]}))
