@@ -14,7 +14,7 @@ from validation.columns import column
 from validation.kernels.records import Stability
 from validation.metrics.errors import Metrics, RunsError
 from validation.metrics.flip import Flip
-from validation.papers.claims import Judged
+from validation.papers.claims import Claim as PaperClaim
 from validation.statistics.records import Agreement, MultipleScattering, Number
 from validation.study.row import Cost
 from validation.timing import FrameTimes, Scaling
@@ -183,4 +183,4 @@ class Report:
     scenes: tuple[Scene, ...] = column(meaning="what was measured, by scene")
     stability: tuple[Stability, ...] = column(meaning="by kernel, where it breaks; empty with `--quick`")
     scaling: tuple[Scaling, ...] = column(meaning="how times grow with the work; empty without `--full`", default=())
-    papers: tuple[Judged, ...] = column(meaning="claims of papers, as `airlight paper` prints them", default=())
+    papers: tuple[PaperClaim, ...] = column(meaning="claims of papers, as `airlight paper` prints them", default=())

@@ -18,7 +18,7 @@ from reports.tables.agreement import verdict
 from reports.tables.costs import TIMES, WORK, same_records
 from reports.tables.table import Column, Table, table, words
 from validation.metrics.errors import Metrics
-from validation.papers.claims import Judged
+from validation.papers.claims import Claim
 from validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
@@ -254,7 +254,7 @@ def _papers(old: Report, new: Report) -> Iterator[Finding]:
             yield Finding(_kind(row, now), "", "", what, row.measured, now.measured)
 
 
-def _kind(row: Judged, now: Judged) -> str:
+def _kind(row: Claim, now: Claim) -> str:
     if row.unit in _TIMED:
         return "note"
     if "reproduced" in (row.verdict, now.verdict):

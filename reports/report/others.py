@@ -14,7 +14,7 @@ from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, part_of
 from validation.kernels.records import Stability
-from validation.papers.claims import EFFORTS, Claim, Judged, claims, experiments, judged
+from validation.papers.claims import EFFORTS, Claim, claims, experiments, judged
 from validation.study.configuration import Configuration, user_code
 from validation.study.study import Study, standard_study
 from validation.timing import Scaling
@@ -129,12 +129,12 @@ def _experiment(
     return name, experiments()[name].run()
 
 
-def paper_rows(results: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Judged]:
+def paper_rows(results: Sequence[tuple[str, Mapping[str, Any]]]) -> list[Claim]:
     """Return the claims that the results of experiments decide."""
     return decided(claims(), dict(results)) if results else []
 
 
-def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[Judged]:
+def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -> list[Claim]:
     """Return the claims whose experiments were made, and those that no experiment can measure.
 
     `figures`, by experiment: numbers by the names that claims.toml gives them, a free set and so no record.
@@ -146,7 +146,7 @@ def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -
     ]
 
 
-def measure_claims(chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None) -> list[Judged]:
+def measure_claims(chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None) -> list[Claim]:
     """Measure what claims need and is not cached, and return those that are decided; `quick` leaves out images."""
     parts = {name: _paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])}
     steps = spans_of({name: part.seconds for name, part in parts.items()})

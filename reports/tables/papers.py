@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from reports.tables.table import Interval, Row, Table, Value, numbers, table, words
-from validation.papers.claims import VERDICTS, Judged, papers
+from validation.papers.claims import VERDICTS, Claim, papers
 
 _COLUMNS = (
     *words(item="item"),
@@ -22,12 +22,12 @@ _COLUMNS = (
 )
 
 
-def paper_tables(rows: Sequence[Judged]) -> list[Table]:
+def paper_tables(rows: Sequence[Claim]) -> list[Table]:
     """Return for each paper a table of verdicts and one of numbers without a verdict."""
     return [*verdict_tables(rows), *number_tables(rows)]
 
 
-def verdict_tables(rows: Sequence[Judged]) -> list[Table]:
+def verdict_tables(rows: Sequence[Claim]) -> list[Table]:
     """Return a table of verdicts for each paper."""
     judged = [row for row in rows if row.verdict is not None]
     return [
@@ -36,7 +36,7 @@ def verdict_tables(rows: Sequence[Judged]) -> list[Table]:
     ]
 
 
-def number_tables(rows: Sequence[Judged]) -> list[Table]:
+def number_tables(rows: Sequence[Claim]) -> list[Table]:
     """Return a table of the numbers without a verdict for each paper."""
     plain = [row for row in rows if row.verdict is None]
     return [
@@ -47,25 +47,25 @@ def number_tables(rows: Sequence[Judged]) -> list[Table]:
     ]
 
 
-def _by_paper(rows: Sequence[Judged]) -> dict[str, list[Judged]]:
+def _by_paper(rows: Sequence[Claim]) -> dict[str, list[Claim]]:
     named = papers()
-    found: dict[str, list[Judged]] = {}
+    found: dict[str, list[Claim]] = {}
     for row in rows:
         found.setdefault(named.get(row.paper, row.paper), []).append(row)
     return found
 
 
-def _table(title: str, rows: Sequence[Judged]) -> Table:
+def _table(title: str, rows: Sequence[Claim]) -> Table:
     return table(title, _COLUMNS, [Row(_cells(row)) for row in rows])
 
 
-def _cells(row: Judged) -> dict[str, Value]:
+def _cells(row: Claim) -> dict[str, Value]:
     interval = Interval.of((row.low, row.high))
     values = {name: getattr(row, name) for name in ("item", "words", "verdict", "published", "measured", "unit", "why")}
     return values | ({"interval": interval} if interval and interval.low < interval.high else {})
 
 
-def count_words(rows: Sequence[Judged]) -> str:
+def count_words(rows: Sequence[Claim]) -> str:
     """Return how many rows have each verdict, in words."""
     counts = Counter(row.verdict for row in rows)
     return f"{len(rows)} claims: " + ", ".join(

@@ -47,6 +47,10 @@ class Claim:
     unit: str = ""
     why: str = ""  #: why the words are read so, or why nothing can be measured
     ours: bool = False  #: the figure depends on the machine or on a scene of our own
+    verdict: str | None = None  #: of `VERDICTS`, once it is judged; None for a number without a direction
+    measured: float | None = None  #: the figure, None before and where there is none, with the ends of its interval
+    low: float | None = None
+    high: float | None = None
 
     @property
     def goal(self) -> float:
@@ -137,26 +141,15 @@ def verdict(claim: Claim, figure: Figure) -> str:
     return REPRODUCED if answers == {True} else DIFFERS if claim.ours else NOT_REPRODUCED
 
 
-@dataclass(frozen=True)
-class Judged(Claim):
-    """A claim beside what was measured; what is not known is None."""
-
-    verdict: str | None = None  #: of `VERDICTS`; None for a number without a direction
-    measured: float | None = None
-    low: float | None = None
-    high: float | None = None
-
-
-def judged(claim: Claim, figures: Figures) -> Judged:
-    """Return a claim beside what was measured; `why` says why there is no figure, or by which rule it is judged."""
+def judged(claim: Claim, figures: Figures) -> Claim:
+    """Return a claim with what was measured; `why` says why there is no figure, or by which rule it is judged."""
     figure = taken(claim, figures) if claim.experiment else claim.why
-    row = Judged(**vars(claim))
     if isinstance(figure, str):
-        return replace(row, verdict=IMPOSSIBLE if claim.direction or not claim.experiment else None, why=figure)
+        return replace(claim, verdict=IMPOSSIBLE if claim.direction or not claim.experiment else None, why=figure)
     value, low, high = figure
-    row = replace(row, measured=value, low=low, high=high)
+    claim = replace(claim, measured=value, low=low, high=high)
     if not claim.direction:
-        return row
+        return claim
     found = verdict(claim, figure)
     apart = f"cannot be told apart, the figure lies between {low:.3g} and {high:.3g}; " if found == IMPOSSIBLE else ""
-    return replace(row, verdict=found, why=f"{apart}{claim.rule}: {claim.why}")
+    return replace(claim, verdict=found, why=f"{apart}{claim.rule}: {claim.why}")
