@@ -71,10 +71,14 @@ def reference_image(
     return _checked_image(reference, {**settings, "plan": plan}, keep=keep, progress=progress)
 
 
-def reference_of_pixels(scene, pixels: NDArray[np.integer]) -> ReferenceImage:
-    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row, (1, count, 3); not kept."""
+def reference_of_pixels(scene, pixels: NDArray[np.integer], plan: PointPlan | None = None) -> ReferenceImage:
+    """Return the quadrature reference of pixels of a Mitsuba scene by number, row by row, (1, count, 3); not kept.
+
+    `plan`: how many samples stand for area lights.
+    """
     whole = read_reference(scene)
-    return _checked_image(replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels]), {})
+    some = replace(whole, width=len(pixels), height=1, direction=whole.direction[pixels])
+    return _checked_image(some, {"plan": plan})
 
 
 def _checked_image(

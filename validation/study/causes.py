@@ -23,16 +23,14 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import find_method
 from realtime.parameters import values
 from realtime.scene.read_scene import Scene
+from validation.arrays import Array
 from validation.columns import column
 from validation.study.configuration import Configuration
-
-Array = NDArray[np.float64]
 
 REST, POINTS = "rest", "light samples"
 

@@ -42,7 +42,7 @@ the error of a frame and falls as 1/N.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -52,6 +52,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import linregress
 
+from validation.arrays import Counted
 from validation.columns import record_of
 from validation.study.ladders import Step
 from validation.study.row import Row
@@ -71,9 +72,7 @@ USUAL = {
 }
 
 
-def study_growth(
-    study: Study, kind: str, steps: Sequence[Step], *, progress: Callable[[int, int, str], None] | None = None
-) -> list[Scaling]:
+def study_growth(study: Study, kind: str, steps: Sequence[Step], *, progress: Counted | None = None) -> list[Scaling]:
     """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`, in the first scene.
 
     A method ends at the first step that it refuses.

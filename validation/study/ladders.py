@@ -27,13 +27,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.scene.animate import turned_light
 from realtime.scene.lights import Light
 from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
 from realtime.scene.read_scene import Scene, read_scene
+from validation.arrays import Array
 from validation.scenes.loading import load_scene
 from validation.scenes.meshes import divided, rotation
 from validation.scenes.parts import mesh_with_material
@@ -149,7 +149,7 @@ def with_shapes(scene, shapes: Iterable[Any]) -> Any:
     return scene_of(list(shapes), {"sensor": scene.sensors()[0]} | parts)
 
 
-def _cut(shape, levels: int, corner: NDArray[np.float64], size: float) -> Any:
+def _cut(shape, levels: int, corner: Array, size: float) -> Any:
     if not _is_cut(shape):
         return shape
     mesh = mesh_triangles(shape)
@@ -161,7 +161,7 @@ def _cut(shape, levels: int, corner: NDArray[np.float64], size: float) -> Any:
     return cut
 
 
-def bumpy(points: NDArray[np.float64], corner: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+def bumpy(points: Array, corner: Array, size: float) -> Array:
     """Return points (n, 3) after the map of space above, for a scene of a `size` from a `corner` on [m]."""
     moved = points.copy()
     for number, wave in enumerate(np.asarray(_WAVES) * (2 * np.pi / size), 1):

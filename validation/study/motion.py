@@ -12,11 +12,11 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.frame.renderer import FrameRenderer
 from realtime.scene.read_scene import Scene, read_scene
+from validation.arrays import Array, Counted
 from validation.estimates.quadrature import reference_image
 from validation.motion.judge import motion_verdict
 from validation.motion.measures import Measures, mean_measures, measure
@@ -26,9 +26,6 @@ from validation.scenes.changes import change_scene
 from validation.scenes.registry import Animation
 from validation.study.configuration import Configuration, prepared
 from validation.study.frame_times import timed_image
-
-Array = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 BEFORE = 8  #: frames at rest before a step
 _JUMP = 12  # of a turn, that a step is
@@ -56,7 +53,7 @@ def method_motion(
     frames: int = 24,
     turn: int = 120,
     runs: int = 4,
-    progress: Progress | None = None,
+    progress: Counted | None = None,
 ) -> list[MethodMotion]:
     """Return the quality of each configuration.
 

@@ -5,22 +5,20 @@ Methods that draw none are rendered once, and stand beside them: all of their er
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
+from validation.arrays import Array, Counted
 from validation.estimates.quadrature import reference_image
 from validation.motion.noise import Noise, measure_error, measure_noise
 from validation.study.configuration import Configuration, prepared
 from validation.study.frame_times import brief_times
-
-Array = NDArray[np.float64]
 
 _SURE = 2.0  # standard errors, below which the mean of the runs is not told from the reference
 
@@ -41,7 +39,7 @@ def method_noise(
     configurations: Sequence[Configuration],
     *,
     runs: int = 16,
-    progress: Callable[[int, int, str], None] | None = None,
+    progress: Counted | None = None,
 ) -> list[MethodNoise]:
     """Return the noise of each configuration's airlight.
 

@@ -6,27 +6,23 @@ fewer here than in `airlight reference`, and their standard error is part of the
 reference there, chosen by chance once for all: quantiles of errors need no more.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.quadrature.ray_values import ReferenceImage, ray_values
-from reference.quadrature.replicates import PointPlan, standard_error
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_reference
+from reference.quadrature.ray_values import ReferenceImage
+from reference.quadrature.replicates import PointPlan
 from reference.storage.kept import Spent, kept, stopwatch
-from validation.estimates.quadrature import check_camera, check_rays, reference_image
+from validation.arrays import Array
+from validation.estimates.quadrature import reference_image, reference_of_pixels
 from validation.metrics.errors import FLOOR
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.study.row import ReferenceError
 from validation.study.study import Cell
-
-Array = NDArray[np.float64]
 
 # Points of area lights: a ray has enough at a standard error of 2 %, and has never more than 8 times 4. Each
 # point takes as long as a point light does, and surfaces take as long again: these are left out.
@@ -97,18 +93,11 @@ def cell_reference(loaded: LoadedScene) -> Reference:
 @kept("sweep-reference")
 def sampled_reference(scene) -> dict[str, NDArray[Any]]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
-    reference = read_reference(scene)
-    check_camera(reference)
-    count = reference.height * reference.width
-    mask = np.zeros(count, dtype=bool)
-    mask[np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _FRACTION)]] = True
-    some = replace(reference, direction=reference.direction[mask])
-    check_rays(some, surface_hits(some).distance)
-    rays = ray_values(some, plan=_PLAN)
-    airlight, bound = np.zeros((count, 3)), np.zeros((count, 3))
-    airlight[mask] = rays.airlight
-    bound[mask] = rays.bound + _STANDARD_ERRORS * standard_error(rays.replicates)[:, :3]
-    if not (np.isfinite(airlight).all() and np.isfinite(bound).all()):
-        raise InputError("the reference is not finite in some pixels: a light may lie on a ray; move it")
-    shape = reference.height, reference.width
+    width, height = scene.sensors()[0].film().size()
+    count = int(width * height)
+    pixels = np.sort(np.random.default_rng(_SEED).permutation(count)[: max(_LEAST, count // _FRACTION)])
+    some = of_image(reference_of_pixels(scene, pixels, plan=_PLAN))
+    airlight, bound, mask = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=bool)
+    airlight[pixels], bound[pixels], mask[pixels] = some.airlight[0], some.bound[0], True
+    shape = int(height), int(width)
     return {"airlight": airlight.reshape(*shape, 3), "bound": bound.reshape(*shape, 3), "mask": mask.reshape(shape)}

@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.frame.renderer import Frame
 from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image
 from reference.storage.kept import Kept, Spent, kept
+from reference.storage.scene_digest import scene_digest
+from validation.arrays import Array
 from validation.columns import record_of
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
@@ -42,12 +43,9 @@ from validation.timing import FrameTimes
 if TYPE_CHECKING:  # what only reports of images need is imported there
     from validation.engine.images import EngineImage
 
-Array = NDArray[np.float64]
 Layer = NDArray[np.floating]  # frames are float32
-Progress = Callable[[float, str], None]
 
 _MULTIPLE = (64, 48)  # size of the image whose fraction of multiple scattering is measured [pixels]
-_DEPTH = "depth"  # the distance among the arrays of a frame
 _COMPILED = 2.0  # that the kernels of a configuration or an estimator take [s], beside its work on one thread
 
 
@@ -85,8 +83,10 @@ class SceneStudy:
 
     @cached_property
     def identity(self) -> str:
-        """The identity of the scene."""
-        return scene_identity(self.path)
+        """The identity of the scene, by its name."""
+        if self.loaded.path is None:
+            return scene_identity(self.name)
+        return f"{self.name} {scene_digest(self.loaded.scene)}"
 
     @cached_property
     def configurations(self) -> tuple[Configuration, ...]:
@@ -154,12 +154,12 @@ def _seconds(work: Work) -> float:
 
 @dataclass(frozen=True)
 class Judged:
-    """A row of a scene, and its image."""
+    """A row of a scene, and its image; of one of our methods as it is kept, without what it is compared with."""
 
     row: Row
     image: Image | None = None  #: its layers; None if there is none
-    expected: Array | None = None  #: what its layer `row.layer` was compared with, (height, width, 3) [W/(m^2 sr)]
-    whole: Array | None = None  #: what all of its light is compared with by HDR-FLIP; None where nobody asks
+    expected: Any = None  #: what its layer `row.layer` was compared with, (height, width, 3) [W/(m^2 sr)]
+    whole: Any = None  #: what all of its light is compared with by HDR-FLIP; None where nobody asks
     results: tuple[Kept[Any], ...] = ()  #: that it was made of
 
     @property
@@ -254,28 +254,16 @@ def multiple_scattering(scene, batches: int, samples: int) -> MultipleScattering
     return multiple_scattering_fraction(scene, batches=batches, samples=samples)
 
 
-@dataclass(frozen=True)
-class Measured:
-    """A row with its images."""
-
-    row: Row
-    layers: dict[str, Layer] = field(default_factory=dict)  #: of its image, the distance among them; none without one
-    expected: Any = None  #: what an image from elsewhere was compared with
-    whole: Any = None  #: and what all of its light is compared with by HDR-FLIP
-
-
 # A fault of the user's method may have gone by the next run.
 @kept("cell", worth=lambda found: found.row.kind == "built-in" or found.row.status == "done")
 def measured(
     cell: Cell, code: list[str], machine: Mapping[str, str], *, study: SceneStudy, apart: Apart | None
-) -> Measured:
+) -> Judged:
     """Return the row and the image of a cell, whose scene is an identity; `code` is that of the user in it."""
     asked = replace(cell, scene=study.path)
     row, frame = run(asked, study.scene, of_image(study.reference), timed_scene=study.timed, apart=apart)
     row = record_of(row, Row)  # without numbers that are not finite
-    if frame is None:
-        return Measured(row)
-    return Measured(row, {"airlight": frame.airlight, "surface": frame.surface, _DEPTH: frame.distance, **frame.extra})
+    return Judged(row, None if frame is None else layered_frame(study.name, cell.chosen, frame))
 
 
 def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: Mapping[Configuration, str]) -> Judged:
@@ -284,13 +272,11 @@ def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: M
         return Judged(row, results=(Kept(row, Spent(0.0, 0.0), time.time(), False),))
     reference = study.reference  # loaded or computed now: it is no part of the time of a configuration
     result = measured.result(*study.given(chosen), study=study, apart=apart)
-    if not result.value.layers:
-        return Judged(result.value.row, results=(result,))
-    layers = dict(result.value.layers)
-    airlight, surface, distance = (layers.pop(name) for name in ("airlight", "surface", _DEPTH))
-    image = layered_frame(study.name, chosen, Frame(airlight, surface, distance, layers))
+    judged = replace(result.value, results=(result,))
+    if judged.image is None:
+        return judged
     whole = reference.airlight + reference.surface if study.study.wants_flip(chosen) else None
-    return Judged(result.value.row, image, reference.airlight, whole, (result,))
+    return replace(judged, expected=reference.airlight, whole=whole)
 
 
 @kept("flip")
@@ -320,15 +306,14 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     result = measured_image.result(
         study.identity, study.size, shown.label, digest, image_times(shown.path), study=study, shown=shown
     )
-    found, attributes = result.value, {"airlight:scene": study.name, "airlight:image": shown.path.name}
-    whole = None if study.study.flip == "none" else found.whole
-    return Judged(found.row, Image(found.layers, attributes=attributes), found.expected, whole, (result,))
+    whole = None if study.study.flip == "none" else result.value.whole
+    return replace(result.value, whole=whole, results=(result,))
 
 
 @kept("scene-image")
 def measured_image(
     scene: str, size: tuple[int, int], label: str, digest: str, times: Any, *, study: SceneStudy, shown: "EngineImage"
-) -> Measured:
+) -> Judged:
     """Return the row of an image with its layers, from the identity of its scene and the digest of its file."""
     from validation.engine.images import measure_image, notes_of
 
@@ -357,7 +342,8 @@ def measured_image(
         whole = judged.reference
     elif "surface" in layers or not np.any(reference.surface > 0):
         whole = reference.airlight + reference.surface
-    return Measured(record_of(row, Row), dict(layers), judged.reference, whole)
+    image = Image(layers, attributes={"airlight:scene": study.name, "airlight:image": shown.path.name})
+    return Judged(record_of(row, Row), image, judged.reference, whole)
 
 
 def _flip_version() -> str:

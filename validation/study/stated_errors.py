@@ -25,7 +25,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from realtime.methods.registry import METHODS
 from realtime.parameters import defaults
@@ -38,9 +37,8 @@ from reference.scene.convex_bounds import normals_at
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, homogeneous_around, read_reference
 from reference.visibility.distances import crossings
+from validation.arrays import Array, Index
 from validation.study.configuration import Configuration
-
-Array = NDArray[np.float64]
 
 #: The error of methods that claim rounding alone, relative to the pixel, or to a thousandth of the mean in the dark.
 ROUNDING = 1e-3
@@ -79,7 +77,7 @@ def _kinks(phase: Any) -> float:
         return float(np.nan_to_num(0.25 * bends / neighbours.min(axis=1), posinf=np.inf).max())
 
 
-def worth_of_ends(scene: Any, pixels: NDArray[np.int64]) -> Array:
+def worth_of_ends(scene: Any, pixels: Index) -> Array:
     """Return the largest error by uncertain ends of lit intervals in an `mi.Scene`, (pixels, 3) [W/(m^2 sr)].
 
     Valid for lights without extent. The ends may be anywhere: the largest x s(x) along a ray counts, lit or not.
@@ -163,7 +161,7 @@ def _from_infinity(reference: ReferenceScene, light: DirectionalLight, point: Ar
 def _scattered(
     reference: ReferenceScene,
     incident: Callable[[Array], tuple[Array, Array]],
-    ray: NDArray[np.int64],
+    ray: Index,
     x: Array,
     distance: Array,
 ) -> Array:
@@ -179,9 +177,7 @@ def _scattered(
     return total
 
 
-def _media(
-    reference: ReferenceScene, ray: NDArray[np.int64], x: Array, distance: Array
-) -> list[tuple[ReferenceMedium, Any]]:
+def _media(reference: ReferenceScene, ray: Index, x: Array, distance: Array) -> list[tuple[ReferenceMedium, Any]]:
     """Return media and which places are in them; a place at a bound is on either side of it."""
     if not reference.media:
         return [(homogeneous_around(reference), np.ones(len(x), dtype=bool))]
