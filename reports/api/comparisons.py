@@ -147,9 +147,9 @@ def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
 def frames_comparison(compared: MotionComparison | NoiseComparison) -> Said:
     """Return how far frames are from the reference of each, or independent renders from theirs."""
     return Said(
-        name=f"{compared.pattern} against {compared.scene}: {compared.words}",
-        data=compared.to_json(),
-        lines=compared.lines(),
+        name=f"{compared.files} against {compared.scene}",
+        data=plain(compared),
+        lines=compared.lines,
         good=not compared.failures,
         of=compared,
     )

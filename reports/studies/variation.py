@@ -52,7 +52,6 @@ def noise(
     """
     from reports.api.render import asked_configurations
     from reports.api.scenes import opened
-    from validation.columns import plain
     from validation.motion.noise import BLURS, time_words
     from validation.study.configuration import named_configurations
     from validation.study.noise import method_noise
@@ -62,17 +61,18 @@ def noise(
     with telling(progress, "noise") as tell:
         found = method_noise(loaded.scene, chosen, runs=runs, progress=counted(tell))
     middle = len(BLURS) // 2
-    rows = [{"label": each.label, **plain(each.noise.to_json())} for each in found]
     shown = [
-        row
+        vars(each.noise)
         | {
+            "label": each.label,
+            "bias": each.noise.bias.value,
             "ms": 1e3 * (each.noise.seconds or 0.0),
             "interval": Interval(*each.noise.bias_ci) if each.noise.runs > 1 else None,
             "noise": math.sqrt(max(each.noise.variance.value or 0.0, 0.0)),
-            "until": time_words(each.noise.seconds_to(_GOAL)),
+            "until": time_words(each.noise.time_to(_GOAL)),
             "blurred": each.noise.blurred_rmse[middle],
         }
-        for row, each in zip(rows, found, strict=True)
+        for each in found
     ]
     columns = (
         *words(label="method"),
@@ -85,13 +85,13 @@ def noise(
         *numbers(blurred=f"RMSE blurred, {BLURS[middle]:g} px", how=FRACTION),
     )
     title = f"{loaded.name}: errors of one frame, relative to the mean of the reference"
-    data = with_environment(scene=loaded.name, runs=runs, rows=rows)
+    data = with_environment(scene=loaded.name, runs=runs, rows=found)
     return Study(
         name="noise",
         data=data,
         tables=(table(title, columns, shown),),
-        lines=tuple(f"{each.label}: {each.noise.words}" for each in found),
-        rows=tuple(rows),
+        lines=tuple(f"{each.label}: {each.noise.verdict}" for each in found),
+        rows=tuple(found),
         draw=partial(_draw_noise, found),
     )
 
@@ -189,14 +189,22 @@ def motion(
         *numbers(lag="lag", lag_se="its error", ghost="ghost", ghost_se="its error", pop="pop"),
         *words("verdict"),
     )
-    rows = [each.to_json() for each in found]
+    rows = []
+    for each in found:
+        row: dict[str, Any] = {"label": each.label, "verdict": each.verdict}
+        if each.measures:
+            told = {name: getattr(each.measures, name) for name in ("relative_rmse", "bias", "flicker", "ghost")}
+            told["lag"] = each.measures.lag.lag
+            row |= {name: estimate.value for name, estimate in told.items()} | {"pop": each.measures.pop}
+            row |= {f"{name}_se": told[name].error for name in ("lag", "ghost")}
+        rows.append(row)
     title = f"{loaded.name}, {frames} frames of a {stimulus}: errors relative to the mean of the references"
-    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=rows)
+    data = with_environment(scene=loaded.name, stimulus=stimulus, frames=frames, turn=_TURN, runs=_RUNS, rows=found)
     return Study(
         name="motion",
         data=data,
         tables=(table(title, columns, rows),),
-        rows=tuple(rows),
+        rows=tuple(found),
         draw=partial(_draw_motion, found),
     )
 

@@ -16,7 +16,6 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from reference.scene.read import ReferenceScene, read_reference
 from reference.storage.exr import NOTE, read_exr
 from reference.storage.files import temporary_folder
 from validation.arrays import Array, Bools, Index, Progress
-from validation.columns import plain
 from validation.engine.judge import lamp_distance, relative_bound
 from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import PIXELS, pixel_kinds, scene_of_size
@@ -48,22 +46,31 @@ _BESIDE = 1.0  # of a lamp [pixels]
 
 
 @dataclass(frozen=True)
+class MotionVerdict:
+    """The verdict on a sequence of frames."""
+
+    kind: str  #: 'exact', 'noise', 'lag', 'late', 'ghost', 'not one lag' or 'cannot be told'
+    words: str
+
+
+@dataclass(frozen=True)
 class MotionComparison:
     """Frames of a renderer against the reference of each."""
 
     scene: str
-    pattern: str
+    files: str  #: with # for the digits of a number
     size: tuple[int, int]
-    record: FramesRecord
-    layer: JudgedLayer
+    frames: int
+    layer: str
+    expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
     pixel: str
     reference_error: float  #: of the worst frame, relative to its mean
     masks: Mapping[str, Measures]  #: 'all' first
-    kind: str  #: 'exact', 'noise', 'lag', 'late', 'ghost', 'not one lag' or 'cannot be told'
-    words: str  #: the verdict in words
+    verdict: MotionVerdict
+    lag_ms: float | None  #: None where the frames have no rate
     shifts: Mapping[int, float]  #: relative RMSE of frames against the reference so many frames before
-    margin: float | None
     notes: tuple[str, ...]
+    failures: tuple[str, ...]  #: why the comparison must be called failed
 
     @property
     def measures(self) -> Measures:
@@ -71,25 +78,13 @@ class MotionComparison:
         return self.masks["all"]
 
     @property
-    def failures(self) -> tuple[str, ...]:
-        """Why the comparison must be called failed; empty if it is not."""
-        reasons = []
-        if self.measures.nonfinite:
-            reasons.append(f"{self.measures.nonfinite} values are NaN or infinite")
-        bias = self.measures.bias
-        if self.margin is not None and bias.value is not None:
-            most = abs(bias.value) + 2 * (bias.error or 0.0)
-            if most > self.margin:
-                reasons.append(f"the relative bias is not shown to be within +-{self.margin:.3g}")
-        return tuple(reasons)
-
     def lines(self) -> list[str]:
         """Return the numbers as text, a line for each group."""
         found, lag = self.measures, self.measures.lag
         width, height = self.size
         lines = [
-            f"scene            {self.scene}, {width} x {height}, {self.record.frames} frames; reference: "
-            f"{self.layer.holds}, pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
+            f"scene            {self.scene}, {width} x {height}, {self.frames} frames; reference: "
+            f"{self.expected}, pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
             f"values           {found.values}, {found.nonfinite} not finite; the reference changes by "
             f"{_percent(found.reference_change)} a frame",
             f"relative RMSE    {told(found.relative_rmse, 100)} %, relative bias {told(found.bias, 100)} %",
@@ -121,27 +116,7 @@ class MotionComparison:
         lines += [f"shifted          {shifts} off the reference so many frames before"] if shifts else []
         lines += [f"note             {note}" for note in self.notes]
         lines += [f"failed           {reason}" for reason in self.failures]
-        return [*lines, f"verdict          {self.words}"]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name, those of all pixels first."""
-        head = {"scene": self.scene, "files": self.pattern, "size": list(self.size), "frames": self.record.frames}
-        head |= {"layer": self.layer.name, "expected": self.layer.holds, "pixel": self.pixel}
-        head |= {"reference_error": self.reference_error}
-        lag, fps = self.measures.lag.lag.value, self.record.fps
-        numbers: dict[str, Any] = plain(
-            {
-                **head,
-                **self.measures.to_json(),
-                "lag_ms": None if lag is None or fps is None else 1000 * lag / fps,
-                "shifts": {str(shift): error for shift, error in self.shifts.items()},
-                "masks": {name: each.to_json() for name, each in self.masks.items() if name != "all"},
-                "verdict": {"kind": self.kind, "words": self.words},
-                "notes": list(self.notes),
-                "failures": list(self.failures),
-            }
-        )
-        return numbers
+        return [*lines, f"verdict          {self.verdict.words}"]
 
 
 def compare_frames(
@@ -188,21 +163,26 @@ def compare_frames(
         notes += (f"frames {_listed(repeated)} repeat the frame before them, though the reference changed",)
     if NOTE in first.attributes:
         notes += (f"{paths[0]}: {first.attributes[NOTE]}",)
-    kind, words = motion_verdict(masks["all"], frames.reference_error)
+    found = masks["all"]
+    lag, bias = found.lag.lag.value, found.bias
+    failures = [f"{found.nonfinite} values are NaN or infinite"] if found.nonfinite else []
+    if margin is not None and bias.value is not None and abs(bias.value) + 2 * (bias.error or 0.0) > margin:
+        failures.append(f"the relative bias is not shown to be within +-{margin:.3g}")
     return MotionComparison(
         scene=scene,
-        pattern=str(pattern),
+        files=str(pattern),
         size=judged.size,
-        record=record,
-        layer=judged,
+        frames=record.frames,
+        layer=judged.name,
+        expected=judged.holds,
         pixel=kinds[0],
         reference_error=frames.reference_error,
         masks=masks,
-        kind=kind,
-        words=words,
+        verdict=motion_verdict(found, frames.reference_error),
+        lag_ms=None if lag is None or record.fps is None else 1000 * lag / record.fps,
         shifts=shifts,
-        margin=margin,
         notes=notes,
+        failures=tuple(failures),
     )
 
 
@@ -320,15 +300,15 @@ def _shifts(sequence: Sequence) -> dict[int, float]:
     return {shift: math.sqrt(sums[shift] * len(frames)) / light for shift in shifts}
 
 
-def motion_verdict(measures: Measures, reference_error: float = 0.0) -> tuple[str, str]:
-    """Return the verdict on a sequence from its measures, see the module: the kind, and words."""
+def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVerdict:
+    """Return the verdict on a sequence from its measures, see the module."""
     rmse = measures.relative_rmse.value or 0.0
     if rmse <= max(_ROUNDING, 3 * reference_error):
-        return "exact", f"exact: relative RMSE {rmse:.2g}"
+        return MotionVerdict("exact", f"exact: relative RMSE {rmse:.2g}")
     lag, persistence, delay = measures.lag.lag, measures.lag.persistence, measures.lag.delay
     noise = (measures.flicker_beside_lag.value or 0.0) / math.sqrt(2)
     if lag.value is None or lag.error is None or lag.error > _TOLD or (delay.error or 0.0) > _TOLD:
-        return (
+        return MotionVerdict(
             "cannot be told",
             f"no lag can be told: the reference changes by {_percent(measures.reference_change)} a frame, the noise is "
             f"{_percent(noise)}",
@@ -339,20 +319,20 @@ def motion_verdict(measures: Measures, reference_error: float = 0.0) -> tuple[st
     described = measures.lag.described if measures.lag.described is not None else 1.0
     if delay.value and not kept and described > _ONE_DELAY:
         words = "late" if delay.value > 0 else "early"
-        return "late", f"the frames are {words} by {_frames(abs(delay.value))}"
+        return MotionVerdict("late", f"the frames are {words} by {_frames(abs(delay.value))}")
     if (kept or delay.value) and described >= _ONE_LAG:
         constant = measures.lag.time_constant.value
         after = "" if constant is None else f"; what is missing of a change falls as exp(-n/{constant:.3g})"
-        return "lag", f"the frames lag by {lag.value:.4g} +- {lag.error:.2g} frames{after}"
+        return MotionVerdict("lag", f"the frames lag by {lag.value:.4g} +- {lag.error:.2g} frames{after}")
     if measures.ghost.above(_SURE):
         ages = [each.value or 0.0 for each in measures.ghost_by_age]
-        return (
+        return MotionVerdict(
             "ghost",
             f"a ghost: {_percent(measures.ghost.value or 0.0)} of the light that left a place is still there"
             + (f"; the impulse response is largest {_oldest(measures)} after it" if ages else ""),
         )
     if kept or delay.value:
-        return (
+        return MotionVerdict(
             "not one lag",
             f"not one lag: it describes {_percent(described)} of what the frames keep of earlier ones; see the impulse "
             "response",
@@ -361,7 +341,7 @@ def motion_verdict(measures: Measures, reference_error: float = 0.0) -> tuple[st
     factor = ""
     if gain.value is not None and abs(gain.value - 1) > max(_SURE * (gain.error or 0.0), 1e-5):
         factor = f", and a factor of {gain.value:.5g}"
-    return "noise", f"no lag: noise of {_percent(noise)}{factor}"
+    return MotionVerdict("noise", f"no lag: noise of {_percent(noise)}{factor}")
 
 
 def _oldest(measures: Measures) -> str:

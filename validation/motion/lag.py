@@ -58,24 +58,8 @@ class Lag:
     delay: Estimate = UNKNOWN  #: [frames]
     described: float | None = None  #: fraction of what an impulse response explains; None where the lag may be zero
     response: tuple[Estimate, ...] = ()  #: of a flash, by frame after it
-
-    @property
-    def lag(self) -> Estimate:
-        """The mean age of the light that is shown [frames]."""
-        a, d = self.persistence, self.delay
-        if a.value is None or d.value is None:
-            return UNKNOWN
-        error = None if a.error is None else a.error / (1 - a.value) ** 2
-        return Estimate(d.value + a.value / (1 - a.value), error)
-
-    @property
-    def time_constant(self) -> Estimate:
-        """After how many frames 1/e of a step is missing; unknown where nothing is known to persist."""
-        a = self.persistence
-        if a.value is None or not 1e-6 < a.value < 1 or not a.above(2):
-            return UNKNOWN
-        error = None if a.error is None else a.error / (a.value * math.log(a.value) ** 2)
-        return Estimate(-1 / math.log(a.value), error)
+    lag: Estimate = UNKNOWN  #: mean age of the light that is shown [frames]
+    time_constant: Estimate = UNKNOWN  #: frames after which 1/e of a step is missing; unknown where nothing persists
 
 
 def filtered_frames(
@@ -106,7 +90,19 @@ def fit_lag(cells: Cells) -> Lag:
         return Lag(offset, gain)
     response, described = _impulse_response(cells, _cost(sums.sum(axis=0)))
     told = delay.value != 0 or abs(kept.value) > 4 * (kept.error or 0.0)
-    return Lag(offset, gain, kept, delay, described if told else None, response)
+    age = Estimate(DELAYS[best] + kept.value / (1 - kept.value), _times(kept.error, 1 / (1 - kept.value) ** 2))
+    return Lag(offset, gain, kept, delay, described if told else None, response, age, _time_constant(kept))
+
+
+def _time_constant(kept: Estimate) -> Estimate:
+    if kept.value is None or not 1e-6 < kept.value < 1 or not kept.above(2):
+        return UNKNOWN
+    rate = math.log(kept.value)
+    return Estimate(-1 / rate, _times(kept.error, 1 / (kept.value * rate**2)))
+
+
+def _times(error: float | None, slope: float) -> float | None:
+    return None if error is None else slope * error
 
 
 def _few(cells: Cells) -> Cells:

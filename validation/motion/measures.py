@@ -90,23 +90,6 @@ class Measures:
     change_by_frame: tuple[float, ...]  #: of the reference
     repeated: tuple[int, ...]  #: frames that are the one before, bit by bit, though the reference moved
 
-    def to_json(self) -> dict:
-        """Return every number by name; `NAME_se` is the standard error of NAME, null where it is not known."""
-        found: dict = {}
-        lag = self.lag
-        several = {"lag": lag.lag, "time_constant": lag.time_constant, "gain": lag.gain, "offset": lag.offset}
-        several |= {"persistence": lag.persistence, "delay": lag.delay}
-        several |= {each.name: getattr(self, each.name) for each in fields(self) if each.name != "lag"}
-        for name, value in several.items():
-            if isinstance(value, Estimate):
-                found |= {name: value.value, f"{name}_se": value.error}
-            elif name != "ghost_by_age":
-                found[name] = list(value) if isinstance(value, tuple) else value
-        found["described"] = lag.described
-        for name, values in (("impulse_response", lag.response), ("ghost_by_age", self.ghost_by_age)):
-            found |= {name: [each.value for each in values], f"{name}_se": [each.error for each in values]}
-        return found
-
 
 def measure(sequence: Sequence) -> Measures | None:
     """Return all measures of a sequence, which is read twice; None where nothing counts, or all is dark."""

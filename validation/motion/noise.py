@@ -29,10 +29,9 @@ it is filtered. The blur gain is the root mean square of n after a Gaussian of d
 
 import math
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -42,10 +41,9 @@ from scipy.stats import nct
 from analytic.errors import InputError
 from reference.storage.exr import read_exr
 from validation.arrays import Array, Progress
-from validation.columns import plain
 from validation.engine.images import image_times
 from validation.engine.judge import fitting_kind, references, relative_bound
-from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
+from validation.engine.judged_layer import expected_layer, judged_layer
 from validation.engine.seen import pixel_kinds, scene_of_size
 from validation.motion.blocks import Estimate, parts_of_error, told
 from validation.statistics.samples import student, student_quantile
@@ -77,16 +75,13 @@ class Noise:
     blurred_rmse: tuple[float, ...]  #: after each of `BLURS`
     blur_gain: tuple[float, ...] = ()
     seconds: float | None = None  #: of a run [s]
+    root_bias: float | None = None  #: the root of the squared bias, where it is above zero by two errors
+    efficiency: float | None = None  #: 1/(V T), which stays where samples and time are both doubled [1/s]
+    seconds_to: Mapping[float, float | None] = field(default_factory=dict)  #: by error, see `time_to`
+    verdict: str = ""  #: on bias and noise, in words
 
-    @property
-    def root_bias(self) -> float | None:
-        """The root of the squared bias, where it is above zero by two errors."""
-        value = self.squared_bias.value
-        return math.sqrt(value) if value is not None and self.squared_bias.above(2) else None
-
-    @property
     def words(self) -> str:
-        """The verdict on bias and noise."""
+        """Return the verdict on bias and noise."""
         low, high = (100 * end for end in self.bias_ci)
         if self.runs == 1:
             return f"no random numbers: all of its error is bias, {low:+.3g} % in the mean"
@@ -105,13 +100,7 @@ class Noise:
             return f"a bias that changes its sign over the image: {100 * (self.root_bias or 0):.3g} %"
         return f"a bias of {100 * (self.bias.value or 0):+.3g} %, 95 % interval {low:+.3g} to {high:+.3g} %"
 
-    @property
-    def efficiency(self) -> float | None:
-        """1/(V T), which does not change where samples and time are both doubled [1/s]."""
-        variance = self.variance.value
-        return 1 / (variance * self.seconds) if variance and self.seconds else None
-
-    def seconds_to(self, error: float) -> float | None:
+    def time_to(self, error: float) -> float | None:
         """Return the time until averaged runs have an error [s]; infinite where the bias is larger."""
         if self.seconds is None or self.variance.value is None:
             return None
@@ -124,30 +113,42 @@ class Noise:
         """Return the error of so many averaged runs."""
         return math.sqrt(max((self.squared_bias.value or 0.0) + (self.variance.value or 0.0) / runs, 0.0))
 
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name; `NAME_se` is the standard error of NAME."""
-        found: dict[str, Any] = {}
-        for name, value in asdict(self).items():
-            own = getattr(self, name)
-            told = isinstance(own, Estimate)
-            found |= {name: own.value, f"{name}_se": own.error} if told else {name: value}
-        found |= {"root_bias": self.root_bias, "efficiency": self.efficiency}
-        found["error_of_runs"] = {str(count): self.after(count) for count in (1, 4, 16, 64, 256)}
-        return found | {"seconds_to": {str(goal): self.seconds_to(goal) for goal in GOALS}, "verdict": self.words}
-
 
 def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None = None) -> Noise:
-    """Return the noise of renders of a frame.
+    """Return the noise of renders of a frame; all of the error of a single one is bias.
 
-    `reference`: (height, width, channels), finite; `runs`: independent renders of that shape, at least two, finite;
-    `seconds`: what one takes. Raises InputError for fewer, a dark reference, and runs that are the same.
+    `reference`: (height, width, channels), finite; `runs`: independent renders of that shape, finite; one of a renderer
+    without random numbers; `seconds`: what one takes. Raises InputError for a dark reference, and runs that are the
+    same.
     """
     count, mean = len(runs), float(reference.mean())
-    if count < 2:
-        raise InputError(f"runs: got {count}, wanted at least two independent renders of the frame")
     if not mean > 0:
         raise InputError("runs: the reference is dark: nothing is relative to it")
     errors = np.array([(run - reference) / mean for run in runs])
+    blurred = [_blurred(errors, blur) for blur in BLURS]
+    bias, square = float(errors.mean()), float(np.mean(errors**2))
+    known = Noise(
+        runs=count,
+        bias=Estimate(bias, 0.0),
+        bias_ci=(bias, bias),
+        squared_bias=Estimate(square, 0.0),
+        relative_rmse=math.sqrt(square),
+        blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
+        seconds=seconds,
+    )
+    known = known if count == 1 else _with_spread(known, errors, blurred)
+    square_of_bias, variance = known.squared_bias, known.variance.value
+    known = replace(
+        known,
+        root_bias=math.sqrt(square_of_bias.value) if square_of_bias.value and square_of_bias.above(2) else None,
+        efficiency=1 / (variance * seconds) if variance and seconds else None,
+    )
+    return replace(known, seconds_to={goal: known.time_to(goal) for goal in GOALS}, verdict=known.words())
+
+
+def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise:
+    """Return the noise with what several runs tell, from their relative errors as they are and blurred."""
+    count = len(errors)
     if (errors[1:] == errors[0]).all():
         raise InputError("runs: all are the same, bit by bit; wanted renders with a seed of their own each")
     flat = errors.reshape(count, -1)
@@ -159,47 +160,22 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     square = float(np.mean(noise**2))
     largest = float(noise.flat[np.argmax(np.abs(noise))])
     spectrum, low = _spectrum(noise)
-    blurred = [_blurred(errors, blur) for blur in BLURS]
     gains = []
     for blur, values in zip(BLURS, blurred, strict=True):
         apart = (values - values.mean(axis=0)) * math.sqrt(count / (count - 1))
         gains.append(math.sqrt(float(np.mean(apart**2)) / square) * 2 * math.sqrt(math.pi) * blur)
-    return Noise(
-        runs=count,
+    return replace(
+        known,
         bias=Estimate(bias, deviation / math.sqrt(count)),
         bias_ci=(bias - half, bias + half),
         detectable_bias=detectable(count) * deviation,
         squared_bias=squared_bias,
         variance=variance,
-        relative_rmse=math.sqrt(float(np.mean(errors**2))),
         largest_deviation=largest,
         largest_fraction=largest**2 / (square * noise.size),
         spectrum=spectrum,
         low_fraction=low,
-        blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
         blur_gain=tuple(gains),
-        seconds=seconds,
-    )
-
-
-def measure_error(reference: Array, image: Array, seconds: float | None = None) -> Noise:
-    """Return the same of a renderer that makes one image only: all of its error is bias.
-
-    Raises InputError for a dark reference.
-    """
-    mean = float(reference.mean())
-    if not mean > 0:
-        raise InputError("runs: the reference is dark: nothing is relative to it")
-    error = (image - reference)[None] / mean
-    bias, square = float(error.mean()), float(np.mean(error**2))
-    return Noise(
-        runs=1,
-        bias=Estimate(bias, 0.0),
-        bias_ci=(bias, bias),
-        squared_bias=Estimate(square, 0.0),
-        relative_rmse=math.sqrt(square),
-        blurred_rmse=tuple(math.sqrt(float(np.mean(_blurred(error, blur) ** 2))) for blur in BLURS),
-        seconds=seconds,
     )
 
 
@@ -239,42 +215,23 @@ class NoiseComparison:
     """Independent renders of a frame against the reference of its scene."""
 
     scene: str
-    pattern: str
+    files: str  #: with # for the digits of a number
     size: tuple[int, int]
-    layer: JudgedLayer
+    layer: str
+    expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
     pixel: str
     reference_error: float  #: relative to the mean
     noise: Noise
     nonfinite: int  #: values that are not finite in some run, left out of all
-    device: str
-    margin: float | None
+    device: str  #: empty where no file says it
+    failures: tuple[str, ...]  #: why the comparison must be called failed
 
     @property
-    def failures(self) -> tuple[str, ...]:
-        """Why the comparison must be called failed; empty if it is not."""
-        reasons = [f"{self.nonfinite} values are NaN or infinite in some run"] if self.nonfinite else []
-        if self.margin is not None and max(map(abs, self.noise.bias_ci)) > self.margin:
-            reasons.append(f"the relative bias is not shown to be within +-{self.margin:.3g}")
-        return tuple(reasons)
-
-    @property
-    def words(self) -> str:
-        """The verdict on bias and noise."""
-        return self.noise.words
-
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name."""
-        head: dict[str, Any] = {"scene": self.scene, "files": self.pattern, "size": self.size, "layer": self.layer.name}
-        head |= {"expected": self.layer.holds, "pixel": self.pixel, "reference_error": self.reference_error}
-        tail = {"nonfinite": self.nonfinite, "device": self.device or None}
-        found: dict[str, Any] = plain(head | self.noise.to_json() | tail | {"failures": self.failures})
-        return found
-
     def lines(self) -> list[str]:
         """Return the numbers as text, a line for each group."""
         noise, width, height = self.noise, *self.size
         lines = [
-            f"scene            {self.scene}, {width} x {height}, {noise.runs} runs; reference: {self.layer.holds}, "
+            f"scene            {self.scene}, {width} x {height}, {noise.runs} runs; reference: {self.expected}, "
             f"pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
             f"bias             {told(noise.bias, 100)} %, squared {told(noise.squared_bias)}",
             f"noise            {100 * math.sqrt(max(noise.variance.value or 0.0, 0.0)):.4g} % of a run, variance "
@@ -291,10 +248,11 @@ class NoiseComparison:
             ),
         ]
         if noise.seconds is not None:
-            times = ", ".join(f"{100 * goal:g} %: {time_words(noise.seconds_to(goal))}" for goal in GOALS)
-            lines.append(f"time             {1000 * noise.seconds:.4g} ms a run {self.device}; to an error of {times}")
+            times = ", ".join(f"{100 * goal:g} %: {time_words(seconds)}" for goal, seconds in noise.seconds_to.items())
+            on = f" on {self.device}" if self.device else ""
+            lines.append(f"time             {1000 * noise.seconds:.4g} ms a run{on}; to an error of {times}")
         lines += [f"failed           {reason}" for reason in self.failures]
-        return [*lines, f"verdict          {self.words}"]
+        return [*lines, f"verdict          {noise.verdict}"]
 
 
 def compare_runs(
@@ -331,18 +289,23 @@ def compare_runs(
     fitting = reference_of(kind.pixel)
     reference = expected_layer(fitting, first)
     time = image_times(paths[0])
-    filled = list(np.where(finite, runs, reference))
+    filled, nonfinite = list(np.where(finite, runs, reference)), int((~finite).sum())
+    noise = measure_noise(reference, filled, None if time is None else time[0].median_ms / 1e3)
+    failures = [f"{nonfinite} values are NaN or infinite in some run"] if nonfinite else []
+    if margin is not None and max(map(abs, noise.bias_ci)) > margin:
+        failures.append(f"the relative bias is not shown to be within +-{margin:.3g}")
     return NoiseComparison(
         scene=loaded.name,
-        pattern=str(pattern),
+        files=str(pattern),
         size=first.size,
-        layer=first,
+        layer=first.name,
+        expected=first.holds,
         pixel=kind.pixel,
         reference_error=relative_bound(fitting),
-        noise=measure_noise(reference, filled, None if time is None else time[0].median_ms / 1e3),
-        nonfinite=int((~finite).sum()),
-        device="" if time is None or not time[1] else f"on {time[1]}",
-        margin=margin,
+        noise=noise,
+        nonfinite=nonfinite,
+        device="" if time is None else time[1],
+        failures=tuple(failures),
     )
 
 

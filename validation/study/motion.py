@@ -39,10 +39,6 @@ class MethodMotion:
     measures: Measures | None  #: None where the reference is dark
     verdict: str
 
-    def to_json(self) -> dict[str, Any]:
-        """Return every number by name."""
-        return {"label": self.label, "verdict": self.verdict} | (self.measures.to_json() if self.measures else {})
-
 
 def method_motion(
     scene: Any,
@@ -83,7 +79,7 @@ def method_motion(
             images = method_frames(replace(renderer, run=run), places)
             several.append(measure(Frames(frames, images.__getitem__, references.__getitem__, lambda n: everywhere)))
         found = [each for each in several if each is not None]
-        words = motion_verdict(found[0])[1] if found else "the reference is dark"
+        words = motion_verdict(found[0]).words if found else "the reference is dark"
         rows.append(MethodMotion(chosen.label, mean_measures(found) if found else None, words))
     return rows
 

@@ -6,7 +6,7 @@ Methods that draw none are rendered once, and stand beside them: all of their er
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from validation.arrays import Array, Counted
 from validation.estimates.quadrature import reference_image
-from validation.motion.noise import Noise, measure_error, measure_noise
+from validation.motion.noise import Noise, measure_noise
 from validation.study.configuration import Configuration, prepared
 from validation.study.frame_times import brief_times
 
@@ -29,9 +29,11 @@ class MethodNoise:
 
     label: str
     noise: Noise
-    reference: Array  #: (height, width, 3) [W/(m^2 sr)]
-    mean: Array  #: of the runs; the reference where it is within two standard errors, (height, width, 3)
-    deviation: Array  #: of a run, (height, width, 3) [W/(m^2 sr)]
+    reference: Array = field(repr=False)  #: (height, width, 3) [W/(m^2 sr)]
+    mean: Array = field(
+        repr=False
+    )  #: of the runs; the reference where it is within two standard errors, (height, width, 3)
+    deviation: Array = field(repr=False)  #: of a run, (height, width, 3) [W/(m^2 sr)]
 
 
 def method_noise(
@@ -60,10 +62,9 @@ def method_noise(
             images.append(np.asarray(render_frame(replace(renderer, run=run)).airlight, dtype=np.float64))
         seconds = brief_times(renderer)[0].frame.median_ms / 1e3
         if all(np.array_equal(each, images[0]) for each in images[1:]):
-            noise, deviation = measure_error(reference, images[0], seconds), np.zeros_like(reference)
-        else:
-            noise, deviation = measure_noise(reference, images, seconds), np.std(images, axis=0, ddof=1)
-        mean = np.mean(images, axis=0)
+            images = images[:1]
+        mean, deviation = np.mean(images, axis=0), np.std(images, axis=0, ddof=min(1, len(images) - 1))
         told = np.abs(mean - reference) > _SURE / math.sqrt(count) * deviation
-        found.append(MethodNoise(chosen.label, noise, reference, np.where(told, mean, reference), deviation))
+        noise, shown = measure_noise(reference, images, seconds), np.where(told, mean, reference)
+        found.append(MethodNoise(chosen.label, noise, reference, shown, deviation))
     return found

@@ -40,7 +40,7 @@ def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_bes
     moves = ("--method", "shadow-planes", "--frames", "3", "--animate", "objects")
     run("sphere-spot", *SMALL, *moves, "-o", str(tmp_path / "a.exr"))
     found = airlight.compare("sphere-spot", str(tmp_path / "a-####.exr"), frames=tmp_path / "a.json")
-    assert found.of.kind == "exact"
+    assert found.of.verdict.kind == "exact"
 
 
 @pytest.mark.claim("render-says-what-it-wrote")

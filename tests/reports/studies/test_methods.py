@@ -110,23 +110,24 @@ def test_noise_and_bias_of_methods_are_told_apart(variant, tmp_path):
     study = airlight.study(
         "noise", "open-fog", runs=runs, size=TINY, method=[airlight.configuration("unshadowed", "exact"), speckled]
     )
-    still, noisy = study
+    still, noisy = (row.noise for row in study)
     reference = airlight.reference("open-fog", size=TINY).airlight.astype(np.float64)
-    assert still["runs"] == 1
-    assert still["variance"] == 0
-    assert still["relative_rmse"] < 1e-5  # float32 beside the light
-    assert still["low_fraction"] is None
+    assert still.runs == 1
+    assert still.variance.value == 0
+    assert still.relative_rmse < 1e-5  # float32 beside the light
+    assert math.isnan(still.low_fraction)
     # A number even in [0, 2] has the variance 1/3. All channels share it: values are a third as many.
     variance = np.mean(reference**2) / reference.mean() ** 2 / 3
-    assert noisy["runs"] == runs
-    assert abs(noisy["variance"] - variance) < 4 * noisy["variance_se"]
-    assert abs(noisy["bias"]) < 4 * noisy["bias_se"]
-    assert abs(noisy["squared_bias"]) < 4 * noisy["squared_bias_se"]
-    assert noisy["efficiency"] == pytest.approx(1 / (noisy["variance"] * noisy["seconds"]))
+    assert noisy.runs == runs
+    assert abs(noisy.variance.value - variance) < 4 * noisy.variance.error
+    assert abs(noisy.bias.value) < 4 * noisy.bias.error
+    assert abs(noisy.squared_bias.value) < 4 * noisy.squared_bias.error
+    assert noisy.efficiency == pytest.approx(1 / (noisy.variance.value * noisy.seconds))
+    assert study.to_dict()["rows"][0]["noise"]["low_fraction"] is None
     assert study.save(tmp_path / "noise.png").stat().st_size > 1000
-    brighter = airlight.study("noise", "open-fog", runs=runs, size=TINY, method=speckled, settings="bias=0.5")[0]
-    assert abs(brighter["bias"] - 0.5) < 4 * brighter["bias_se"]
+    brighter = airlight.study("noise", "open-fog", runs=runs, size=TINY, method=speckled, settings="bias=0.5")[0].noise
+    assert abs(brighter.bias.value - 0.5) < 4 * brighter.bias.error
     # The noise is that of the same random numbers, once and a half as large.
-    assert math.sqrt(brighter["variance"] / noisy["variance"]) == pytest.approx(1.5, rel=1e-5)
+    assert math.sqrt(brighter.variance.value / noisy.variance.value) == pytest.approx(1.5, rel=1e-5)
     with pytest.raises(airlight.InputError, match="runs: got 1, wanted at least two"):
         airlight.study("noise", "open-fog", runs=1, size=TINY)

@@ -9,6 +9,7 @@ import pytest
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
+from validation.columns import plain
 from validation.estimates.quadrature import reference_image
 from validation.motion.blocks import parts_of_error
 from validation.motion.noise import Noise, compare_runs, detectable, measure_noise
@@ -39,7 +40,7 @@ def test_white_noise_has_the_closed_form():
         found.blur_gain, 1, atol=0.1
     )  # 768/(4 pi s^2) = 4 independent places of 16 runs, 3 channels
     assert found.efficiency == pytest.approx(1 / (found.variance.value * 0.25))
-    assert found.seconds_to(0.05) == pytest.approx(found.variance.value * 0.25 / 0.05**2, rel=0.02)
+    assert found.seconds_to[0.05] == pytest.approx(found.variance.value * 0.25 / 0.05**2, rel=0.02)
     assert found.largest_fraction < 0.01
 
 
@@ -89,14 +90,14 @@ def test_a_heavy_tail_is_not_taken_for_a_bias():
     tails = (1 - 1 / power) * (1 - random.random((trials, runs, 24, 32))) ** (-1 / power)
     found = [said(each) for each in tails]
     assert np.mean([np.prod(np.sign(each.bias_ci)) > 0 for each in found]) > 0.12  # by Student; 0.27 of 400
-    assert np.mean([each.words.startswith("a bias") for each in found]) <= 0.05
-    assert "cannot be told" in found[0].words
+    assert np.mean([each.verdict.startswith("a bias") for each in found]) <= 0.05
+    assert "cannot be told" in found[0].verdict
     # In skewed noise with a variance a bias of detectable size is found as often as without a look at the tail.
     exponential = random.exponential(size=(trials, runs, 24, 32))
     bias = detectable(runs) / math.sqrt(768)
     skewed = [said(each) for each in exponential - bias]
-    assert not any("cannot be told" in each.words for each in skewed)
-    assert np.mean([each.words.startswith("a bias of -") for each in skewed]) > 0.75  # 0.9 +- 0.047
+    assert not any("cannot be told" in each.verdict for each in skewed)
+    assert np.mean([each.verdict.startswith("a bias of -") for each in skewed]) > 0.75  # 0.9 +- 0.047
 
 
 @pytest.mark.claim("noise-bias")
@@ -119,7 +120,7 @@ def test_a_bias_of_changing_sign_shows_in_its_square():
     found = measure_noise(REFERENCE, [run + sign for run in renders(3, 8)])
     assert found.bias_ci[0] < 0 < found.bias_ci[1]
     assert found.root_bias == pytest.approx(0.1, rel=0.05)
-    assert math.isinf(found.seconds_to(0.05) or math.inf)
+    assert math.isinf(found.seconds_to[0.05] or math.inf)
 
 
 def test_renders_of_a_scene_from_files(variant, tmp_path):
@@ -130,10 +131,10 @@ def test_renders_of_a_scene_from_files(variant, tmp_path):
         write_exr(tmp_path / f"{run:02d}.exr", Image({"airlight": noisy}))
     (tmp_path / "times.json").write_text(json.dumps({"00.exr": {"ms": 5, "device": "a card"}}))
     found = compare_runs("open-fog", tmp_path / "##.exr", pixel="centre", margin=0.01)
-    assert found.words.startswith("a bias of +2")
+    assert found.noise.verdict.startswith("a bias of +2")
     assert found.failures == ("the relative bias is not shown to be within +-0.01",)
-    assert found.to_json()["seconds"] == 0.005
-    assert any("on a card" in line for line in found.lines())
+    assert plain(found)["noise"]["seconds"] == 0.005
+    assert any("on a card" in line for line in found.lines)
     with pytest.raises(InputError, match="0 files have such a name"):
         compare_runs("open-fog", tmp_path / "###.exr")
     with pytest.raises(InputError, match="all are the same"):
