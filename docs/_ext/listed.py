@@ -81,9 +81,13 @@ def _sentence(value: Any) -> str:
 
 
 def _cell(words: str) -> str:
-    """Return words as a cell of a table, in which options are code: two hyphens would become a dash."""
-    flat = " ".join(words.split()).replace("|", "\\|")
-    return re.sub(r"(?<![\w`-])(--[a-z][a-z-]*)", r"`\1`", flat)
+    """Return words as a cell of a table."""
+    return _with_code(" ".join(words.split()).replace("|", "\\|"))
+
+
+def _with_code(words: str) -> str:
+    """Return words in which options are code: two hyphens would become a dash."""
+    return re.sub(r"(?<![\w`-])(--[a-z][a-z-]*)", r"`\1`", words)
 
 
 def methods() -> str:
@@ -162,18 +166,14 @@ def sweep_columns() -> str:
 @cache
 def commands() -> str:
     """Return every command and every study with its arguments, options and words."""
-    from reports.commands.main import command_names, help_of
+    from reports.commands.main import command_names, find_command
 
-    return "\n".join(_command(words, *help_of(words)) for words in command_names())
-
-
-def _command(words: Sequence[str], prose: str, usage: str, options: Sequence[tuple[str, str, str]]) -> str:
-    lines = [f"## airlight {' '.join(words)}", "", "```text", usage, "```", ""]
-    lines += ["\n\n".join(_cell(paragraph) for paragraph in prose.split("\n\n")), ""]
-    rows = [
-        (f"`{names}`", _cell(what) + (f" Default: `{default}`." if default else "")) for names, what, default in options
-    ]
-    return "\n".join([*lines, table(("", "what it does"), rows, 2)] if rows else lines)
+    shown = []
+    for words in command_names():
+        name = " ".join(["airlight", *words])
+        _, _, text = find_command(words).generate_docs(usage_name=name).partition("\n")
+        shown.append(f"## {name}\n{_with_code(text)}")
+    return "\n".join(shown)
 
 
 def report_keys(*parts: str) -> str:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.describe` and `airlight.view`: a scene in numbers, a scene live."""
 
-import os
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -37,8 +36,7 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
     Parameters
     ----------
     scene
-        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns. For
-        a folder the result lists which of its .xml files are taken, with notes, and which are refused, and why.
+        A built-in scene, random:SEED or a Mitsuba XML file; from Python also what `load_scene` takes or returns.
     size
         Width and height [pixels], or WxH; the scene's own by default.
     output
@@ -62,12 +60,6 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
     from reports.machine.environment import activate
 
     activate()
-    if isinstance(scene, str | os.PathLike) and Path(scene).is_dir():
-        from reports.interchange.words import describe_folder
-
-        if size or files:
-            raise InputError(f"scene: got the folder {scene}; leave out size and output")
-        return describe_folder(Path(scene))
     from reports.api.scenes import opened
     from reports.interchange.gltf import write_gltf
     from reports.interchange.scene import describe_scene

@@ -37,7 +37,6 @@ from reports.machine.doctor import doctor
 from reports.machine.environment import (
     VARIANT_VARIABLE,
     MissingError,
-    check_variant,
     install_line,
     missing_packages,
 )
@@ -59,8 +58,7 @@ _PANELS: Mapping[str, tuple[Callable[..., Any], ...]] = {
 _NAMES = {list_: "list", run_tests: "test", run_study: "study"}  #: where the function cannot have the name
 _EPILOGUE = f"""Environment
 
-{VARIANT_VARIABLE}, or --variant NAME before the command: where kernels run, \
-cuda_ad_rgb or llvm_ad_rgb; the first that works by default.
+{VARIANT_VARIABLE}: where kernels run, cuda_ad_rgb or llvm_ad_rgb; the first that works by default.
 
 AIRLIGHT_CACHE_DIR is the folder of what is cached between runs, ~/.cache/airlight by default; \
 AIRLIGHT_CACHE_SIZE is how large it may become, 4GiB by default. See airlight doctor.
@@ -239,23 +237,12 @@ def command_names() -> list[tuple[str, ...]]:
     return [*((name,) for name in names if name != "study"), *(("study", name) for name in STUDIES)]
 
 
-def help_of(words: Sequence[str]) -> tuple[str, str, list[tuple[str, str, str]]]:
-    """Return the prose of a command's help, its line of usage, and names, words and default of each option."""
+def find_command(words: Sequence[str]) -> App:
+    """Return the command, or the study, that some words name."""
     app = make_app(words)
     for word in words:
         app = app[word]
-    arguments = app.assemble_argument_collection()
-    options, usage = [], ["airlight", *words]
-    for each in arguments:
-        if each.field_info.kind is inspect.Parameter.KEYWORD_ONLY:
-            name = ", ".join(dict.fromkeys(("--" + each.name.lstrip("-"), *each.names)))
-        else:
-            name = each.name.strip("-").upper()
-            usage.append(name if each.required else f"[{name}...]" if "str]" in str(each.hint) else f"[{name}]")
-        default = each.field_info.default
-        shown = None if each.required else _shown_default(default)
-        options.append((name, each.parameter.help or "", shown if shown and shown != "True" else ""))
-    return str(app.help), " ".join([*usage, "[OPTIONS]"]), options
+    return app
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -269,7 +256,7 @@ def run(arguments: Sequence[str]) -> int:
     except OSError:  # Dr.Jit ends the process over it
         return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
-        words = _with_variant(list(arguments))
+        words = list(arguments)
         if words[:1] == ["test"] and "--" not in words:  # pytest has options of its own
             ours = [word for word in words[1:] if word in ("--all", "--help", "-h")]
             words = ["test", *ours, "--", *(word for word in words[1:] if word not in ours)]
@@ -300,16 +287,6 @@ def run(arguments: Sequence[str]) -> int:
     if not arguments:
         return WRONG_INPUT
     return status if isinstance(status, int) else DONE
-
-
-def _with_variant(words: list[str]) -> list[str]:
-    """Take --variant from before the command, for `reports.machine.environment.activate` and child processes."""
-    if words and words[0].partition("=")[0] == "--variant":
-        _, equals, name = words.pop(0).partition("=")
-        name = name if equals else words.pop(0) if words else ""
-        check_variant(name)
-        os.environ[VARIANT_VARIABLE] = name
-    return words
 
 
 def _input_errors() -> tuple[type[Exception], ...]:

@@ -18,9 +18,9 @@ from reference.storage.exr import read_exr
 from reference.storage.files import write_text
 from reports.data.reader import load_report
 from reports.data.records import MethodRow, Report, Scene
-from reports.plotting.figure import ENDINGS, new_figure, save_figure, show_picture, speed_panel
+from reports.plotting.figure import ENDINGS, has_point, new_figure, save_figure, show_picture, speed_chart
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
-from reports.plotting.style import COLOURS, WIDTHS, report_styles
+from reports.plotting.style import COLOURS, WIDTHS
 from reports.tables.drawing import latex
 from reports.tables.methods import method_row, methods_table
 from reports.tables.table import Row, number
@@ -41,7 +41,7 @@ def write_figures(
     """
     report, place = load_report(folder)
     drawn: dict[str, Callable[[str], Any]] = {}
-    if any(_timed(each) for each in report.scenes):
+    if any(has_point(entry) for each in report.scenes for entry in each.methods):
         drawn["frame-speed"] = partial(draw_speed, report.scenes)
     if scene or labels or any(_shown(each, name) for each in report.scenes for name in ("airlight", "total")):
         drawn["strip"] = partial(draw_strip, *_strip(report, place, scene, labels))
@@ -79,31 +79,9 @@ def _latex_row(entry: MethodRow) -> Row:
 # Time against error
 
 
-def _timed(scene: Scene) -> list[MethodRow]:
-    return [entry for entry in _measured(scene) if entry.times]
-
-
 def draw_speed(scenes: Sequence[Scene], column: str) -> Any:
     """Return the time of a frame against the error of the airlight, a panel for each scene."""
-    timed = {scene.name: _timed(scene) for scene in scenes if _timed(scene)}
-    # Styles follow from all labels, with or without a point: variants are numbered as on the report's page.
-    there = {entry.label for entries in timed.values() for entry in entries}
-    rows = (row for scene in scenes for row in scene.methods)
-    styles = {label: style for label, style in report_styles(rows).items() if label in there}
-    width, double = WIDTHS[column], column == "double"
-    across = min(len(timed), 3 if double else 1)
-    down = -(-len(timed) // across)
-    legend = -(-len(styles) // (3 if double else 1))
-    figure = new_figure(width, down * min(0.75 * width / across, 2.4) + 0.14 * legend + 0.1)
-    panels = figure.subplots(down, across, squeeze=False)
-    for panel, (name, entries) in zip(panels.flat, timed.items()):
-        speed_panel(panel, name, entries, styles)
-    for panel in panels.flat[len(timed) :]:
-        panel.set_axis_off()
-    figure.supylabel("relative RMSE of the airlight [1]", fontsize="medium")
-    handles = [panels.flat[0].plot([], [], linestyle="none", **style)[0] for style in styles.values()]
-    figure.legend(handles, list(styles), loc="outside lower center", ncols=3 if double else 1)
-    return figure
+    return speed_chart(scenes, WIDTHS[column], across=3 if column == "double" else 1, tallest=2.4)
 
 
 # Images with insets: the two squares in which the methods are wrong the most

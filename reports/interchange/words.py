@@ -1,19 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The description of a scene as a table, and the outcome of each scene file of a folder."""
+"""The description of a scene as a table."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError
-from realtime.errors import InputError as RealtimeInputError
-from reports.interchange.scene import describe_scene
-from reports.machine.mitsuba_log import collected_notes
-from reports.tables.record import Said
-from reports.tables.table import Column, Table, table, words
-from validation.columns import plain
-from validation.scenes.loading import load_scene
+from reports.tables.table import Column, Table, table
 
 _LISTED = 12  # most surfaces and values that are shown; the others are in the JSON
 
@@ -90,37 +81,3 @@ def _words(value: Any, name: str = "") -> str:
     if isinstance(value, bool) or value is None:
         return {True: "yes", False: "no", None: "none"}[value]
     return f"{value:.7g} {_UNITS.get(name, '')}".rstrip() if isinstance(value, int | float) else str(value)
-
-
-@dataclass(frozen=True)
-class FileOutcome:
-    """The outcome of a file."""
-
-    file: str  #: within the folder
-    outcome: str  #: 'taken', 'refused', or 'failed' where the program did not see why
-    words: str  #: notes of a file that was taken, else what stands in the way
-
-
-def describe_folder(folder: Path) -> Said:
-    """Return what `describe` makes of each XML file in a folder and its folders."""
-    files = sorted(folder.rglob("*.xml"))
-    if not files:
-        raise InputError(f"scene: the folder {folder} holds no .xml file; wanted Mitsuba scene files")
-    log = [_outcome(path, folder) for path in files]
-    counts = {word: sum(each.outcome == word for each in log) for word in ("taken", "refused", "failed")}
-    summed = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
-    columns = (*words("file", "outcome"), *words(words="notes, or what stands in the way", how={"long": True}))
-    shown = table(f"{len(log)} scene files: {summed}", columns, map(vars, log))
-    return Said(name=str(folder), data={"folder": str(folder), "files": plain(log)}, tables=(shown,), of=log)
-
-
-def _outcome(path: Path, folder: Path) -> FileOutcome:
-    name = path.relative_to(folder).as_posix()
-    try:
-        with collected_notes() as notes:
-            notes += describe_scene(load_scene(str(path)))["notes"]
-        return FileOutcome(name, "taken", "; ".join(dict.fromkeys(notes)))
-    except (InputError, RealtimeInputError) as reason:
-        return FileOutcome(name, "refused", str(reason).replace(str(path), path.name))
-    except Exception as error:  # a fault of the program in one file: the log says it and goes on with the next
-        return FileOutcome(name, "failed", f"{type(error).__name__}: {' '.join(str(error).split())}")

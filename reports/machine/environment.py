@@ -51,7 +51,7 @@ def prepare(variant: str | None = None) -> Prepared:
 
     Call it before Dr.Jit compiles anything: it sets ``DRJIT_LIBLLVM_PATH``. Takes a few milliseconds. Where
     ``AIRLIGHT_COMPILATION`` is ``quick``, kernels compile quickly and run slowly (`reports.machine.quick_compilation`).
-    The variant is by default ``AIRLIGHT_VARIANT`` (which ``--variant`` sets), else the best that works.
+    The variant is by default ``AIRLIGHT_VARIANT``, else the best that works.
     """
     variant = variant or os.environ.get(VARIANT_VARIABLE) or None
     if variant is not None:
@@ -59,7 +59,9 @@ def prepare(variant: str | None = None) -> Prepared:
     if variant == "cuda_ad_rgb" or variant is None:
         reason = cuda_problem()
         if variant is not None and reason:
-            raise MissingError(f"the variant cuda_ad_rgb does not work here: {reason}; use --variant llvm_ad_rgb")
+            raise MissingError(
+                f"the variant cuda_ad_rgb does not work here: {reason}; set {VARIANT_VARIABLE}=llvm_ad_rgb"
+            )
         variant = "llvm_ad_rgb" if reason else "cuda_ad_rgb"
     on_processor = variant == "llvm_ad_rgb"
     llvm = next(iter(find_llvm()), None)

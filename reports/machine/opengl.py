@@ -1,47 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """OpenGL, which draws the shaders of users: whether it is there, whether it is right, and what to install."""
 
-from dataclasses import dataclass
 from functools import cache
 
 from realtime.errors import NoDriverError
 from realtime.methods.shader.client import ShaderHost
 from reports.machine.environment import MissingError
+from reports.machine.gpu import Status
 
 _DEBIAN = "apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
 
 
-@dataclass(frozen=True)
-class OpenGl:
-    """The OpenGL device that draws shaders."""
+def opengl_status(*, judged: bool = True) -> Status:
+    """Start OpenGL in a separate process; return its device, version and error on certified integrals, or what to do.
 
-    works: bool
-    reason: str  #: device, version and its error on certified integrals, or why there is none and what to do
-
-
-def opengl_status(*, judged: bool = True) -> OpenGl:
-    """Start OpenGL in a process of its own, and judge it the first time that it is met.
-
-    Not `judged` is for machines on which Mitsuba cannot be imported.
+    The error is measured once for each device. Without `judged`, for machines that cannot import Mitsuba, it is not.
     """
     host = ShaderHost("OpenGL")
     try:
         said, _ = host.ask("open", stages=[])
         device = f"{said['device']}, {said['version']}"
         if not judged:
-            return OpenGl(True, device)
+            return Status(True, device)
         from realtime.export.text import CONFORMING
         from reports.machine.driver_check import error_of_device
 
         wrong = error_of_device(device, host=host)
     except NoDriverError as error:
-        return OpenGl(False, str(missing(str(error))))
+        return Status(False, str(missing(str(error))))
     finally:
         host.end()
     words = f"{device}: the kernel `exact` errs by {wrong:.1e} at most on certified integrals"
     if not wrong <= CONFORMING:
-        return OpenGl(False, f"{words}, more than {CONFORMING:g}; LIBGL_ALWAYS_SOFTWARE=1 draws on the processor")
-    return OpenGl(True, words)
+        return Status(False, f"{words}, more than {CONFORMING:g}; LIBGL_ALWAYS_SOFTWARE=1 draws on the processor")
+    return Status(True, words)
 
 
 @cache

@@ -3,41 +3,56 @@
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from html import escape
 from typing import Any
 
 from reports.data.records import Scene
-from reports.plotting.figure import new_figure, short, speed_panel
+from reports.plotting.figure import has_point, legend_below, new_figure, speed_chart, speed_panel
 from reports.plotting.style import report_styles
 
 _SIZE = {"markersize": 7}
 
 
+@contextmanager
+def _style() -> Iterator[None]:
+    """Use the style of charts on the page for a block."""
+    import matplotlib
+
+    with matplotlib.rc_context(
+        {
+            "font.size": 9,
+            "legend.fontsize": 8,
+            "legend.frameon": False,
+            "axes.grid": True,
+            "grid.linewidth": 0.4,
+            "grid.alpha": 0.5,
+        }
+    ):
+        yield
+
+
+@_style()
 def speed_error_chart(scenes: Sequence[Scene]) -> str:
-    """Return speed against error as inline SVG: one panel a scene, one colour and marker a configuration everywhere."""
-    styles = _styles(scenes)
-    columns = min(2, len(scenes))
-    rows = -(-len(scenes) // columns)
-    figure = new_figure(5.1 * columns, 3.3 * rows + 0.9)
-    panels = figure.subplots(rows, columns, squeeze=False)
-    for panel, scene in zip(panels.flat, scenes):
-        _panel(panel, scene, styles)
-    for panel in list(panels.flat)[len(scenes) :]:
-        panel.set_visible(False)
-    _legend(figure, panels.flat[0], styles, columns=3)
-    return svg_text(figure)
+    """Return speed against error of all scenes as inline SVG; nothing where nothing was timed."""
+    if not any(has_point(entry) for scene in scenes for entry in scene.methods):
+        return ""
+    return svg_text(speed_chart(scenes, 5.1 * min(2, len(scenes)), across=2, tallest=3.5, **_SIZE))
 
 
+@_style()
 def scene_chart(scenes: Sequence[Scene], place: int) -> str:
     """Return speed against error in one of the scenes as inline SVG, in the styles of the whole report.
 
     The point of the n-th method that has images has the name "point-n", and says what it is under the pointer.
     """
-    styles, scene = _styles(scenes), scenes[place]
+    rows = (row for scene in scenes for row in scene.methods)
+    styles, scene = {label: style | _SIZE for label, style in report_styles(rows).items()}, scenes[place]
     figure = new_figure(5.2, 3.0)
     panel = figure.subplots()
-    points = _panel(panel, scene, styles)
+    points = speed_panel(panel, scene.name, scene.methods, styles)
+    panel.set_ylabel("relative RMSE of the airlight [1]")
     titles = {}
     for number, entry in enumerate(entry for entry in scene.methods if entry.files):
         if entry.label in points:
@@ -52,28 +67,11 @@ def scene_chart(scenes: Sequence[Scene], place: int) -> str:
     for entry in scene.methods:
         if entry.label in points:
             methods.setdefault(entry.method, styles[entry.label])
-    _legend(figure, panel, methods, columns=4)
+    legend_below(figure, panel, methods, columns=4)
     svg = svg_text(figure, "airlight, one scene")
     for name, words in titles.items():
         svg = svg.replace(f'<g id="{name}">', f'<g id="{name}"><title>{words}</title>')
     return svg
-
-
-def _styles(scenes: Sequence[Scene]) -> dict[str, dict[str, Any]]:
-    rows = (row for scene in scenes for row in scene.methods)
-    return {label: style | _SIZE for label, style in report_styles(rows).items()}
-
-
-def _legend(figure: Any, panel: Any, styles: dict[str, dict[str, Any]], *, columns: int) -> None:
-    handles = [panel.plot([], [], **style, linestyle="none", label=short(label))[0] for label, style in styles.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
-
-
-def _panel(panel: Any, scene: Scene, styles: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    points = speed_panel(panel, scene.name, scene.methods, styles)
-    panel.set_ylabel("relative RMSE of the airlight [1]")
-    panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-    return points
 
 
 def svg_text(figure, salt: str = "airlight") -> str:

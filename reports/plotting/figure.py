@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reference.storage.files import write_bytes
-from reports.data.records import MethodRow
-from reports.plotting.style import WIDTHS, figure_style
+from reports.data.records import MethodRow, Scene
+from reports.plotting.style import WIDTHS, figure_style, report_styles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,6 +77,40 @@ def show_picture(panel: "Axes", picture: Any, title: str = "", size: float = 6) 
     panel.set_title(title, fontsize=size, parse_math=False)  # a dollar in a name must not begin a formula
 
 
+def has_point(entry: MethodRow) -> bool:
+    """Return whether a method has a time and an error; an error of 0 has no place on a logarithmic axis."""
+    return bool(entry.times and entry.error and entry.error.relative_rmse)
+
+
+def speed_chart(scenes: Sequence[Scene], width: float, *, across: int, tallest: float, **marks: Any) -> "Figure":
+    """Return times of frames against errors, a panel for each scene that has any, and one legend.
+
+    A figure is `width` wide, a panel at most `tallest` high [inches]. Styles follow from all labels of a report, with
+    or without a point, and `marks` change them.
+    """
+    timed = [scene for scene in scenes if any(map(has_point, scene.methods))]
+    there = {entry.label for scene in timed for entry in scene.methods if has_point(entry)}
+    rows = (row for scene in scenes for row in scene.methods)
+    styles = {label: style | marks for label, style in report_styles(rows).items() if label in there}
+    across = min(len(timed), across)
+    down, lines = -(-len(timed) // across), -(-len(styles) // min(3, across))
+    figure = new_figure(width, down * min(0.75 * width / across, tallest) + 0.14 * lines + 0.1)
+    panels = figure.subplots(down, across, squeeze=False)
+    for panel, scene in zip(panels.flat, timed):
+        speed_panel(panel, scene.name, scene.methods, styles)
+    for panel in panels.flat[len(timed) :]:
+        panel.set_axis_off()
+    figure.supylabel("relative RMSE of the airlight [1]", fontsize="medium")
+    legend_below(figure, panels.flat[0], styles, columns=min(3, across))
+    return figure
+
+
+def legend_below(figure: "Figure", panel: "Axes", styles: Mapping[str, Mapping[str, Any]], *, columns: int) -> None:
+    """Put the markers of labels below a figure."""
+    handles = [panel.plot([], [], **style, linestyle="none", label=short(label))[0] for label, style in styles.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+
+
 def speed_panel(
     panel: "Axes", title: str, entries: Iterable[MethodRow], styles: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
@@ -85,17 +119,17 @@ def speed_panel(
     For a method that draws random numbers a bar goes down from its error to its bias, or to the largest possible bias.
     """
     points = {}
-    for entry in entries:
-        frame, error = entry.times and entry.times.frame, entry.error and entry.error.relative_rmse
-        if frame and error:  # an error of 0 has no place on a logarithmic axis
-            middle = frame.median_ms
-            spread = [[middle - frame.low_ms], [frame.high_ms - middle]]
-            style = {**styles[entry.label], "linestyle": "none"}
-            if noise := entry.noise:
-                error = noise.rmse
-                bias = noise.most_bias if noise.root_bias is None else noise.root_bias
-                style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
-            points[entry.label] = panel.errorbar([middle], [error], xerr=spread, **style).lines[0]
+    for entry in filter(has_point, entries):
+        assert entry.times
+        assert entry.error
+        frame, error = entry.times.frame, entry.error.relative_rmse or 0.0
+        spread = [[frame.median_ms - frame.low_ms], [frame.high_ms - frame.median_ms]]
+        style = {**styles[entry.label], "linestyle": "none"}
+        if noise := entry.noise:
+            error = noise.rmse
+            bias = noise.most_bias if noise.root_bias is None else noise.root_bias
+            style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
+        points[entry.label] = panel.errorbar([frame.median_ms], [error], xerr=spread, **style).lines[0]
     panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
     panel.set_title(title, parse_math=False)  # a dollar in a file name must not begin a formula
     plain_times(panel)

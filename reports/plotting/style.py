@@ -9,7 +9,6 @@ one method (its kernel, its parameters) keep colour and marker and differ by the
 Nothing heavy is imported at the top, and nothing is set: `figure_style` changes matplotlib's settings for a block.
 """
 
-import itertools
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -81,12 +80,6 @@ def kernel_style(kernel: str, variant: int = 0) -> dict[str, Any]:
     base, _, digits = kernel.rpartition("-")
     name = base if digits.isdecimal() and base in _KERNELS else kernel
     return _marker_style(*_KERNELS.get(name, _OTHER_KERNEL), variant)
-
-
-def scene_styles() -> Iterator[dict[str, Any]]:
-    """Yield matplotlib's properties of the lines of several scenes, one after the other."""
-    for colour, (_, marker) in itertools.cycle(zip(COLOURS, _KERNELS.values())):
-        yield _marker_style(colour, marker, 0)
 
 
 def reference_style() -> dict[str, Any]:

@@ -4,8 +4,9 @@
 Read in this order:
 
 - `registry.py`: what a study returns, the studies by name, and `airlight.study`
-- `methods.py`: methods timed and compared, errors by cause, growth with the work, sizes of shadow maps
-- `kernels.py`: kernels timed, where they break, integrals of a file, Biri's polynomials
+- `methods.py`: methods timed and compared, errors by cause
+- `growth.py`: times and memory as the work grows
+- `kernels.py`: kernels timed, where they break, integrals of a file
 - `variation.py`: bias apart from noise, flicker and lag under a light that moves, estimators of transmittance
 - `clouds.py`: a slab by order of scattering
 """

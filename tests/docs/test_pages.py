@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.commands.main import command_names, help_of
+from reports.commands.main import command_names, find_command
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -58,7 +58,7 @@ def test_pages_build_and_load_nothing_from_a_network(tmp_path):
 def test_commands_and_options_that_documents_name_exist():
     """In blocks of shell and in code between backticks that begins with `airlight`."""
     known = {
-        " ".join(words): {option for names, _, _ in help_of(words)[2] for option in names.split(", ")}
+        " ".join(words): {name for each in find_command(words).assemble_argument_collection() for name in each.names}
         for words in command_names()
     } | {"study": set()}
     found, wrong = 0, []

@@ -2,7 +2,6 @@
 """The command line's own duties: help, usage, exit statuses, one line for each mistake."""
 
 import json
-import os
 import re
 
 import pytest
@@ -100,13 +99,6 @@ def test_names_of_scenes_without_mitsuba_are_those_of_the_registry():
     from validation.scenes.registry import SCENES
 
     assert list(scene_names()) == sorted(SCENES)
-
-
-@pytest.mark.claim("variant")
-def test_variant_reaches_activate(monkeypatch):
-    monkeypatch.setenv("AIRLIGHT_VARIANT", "")
-    assert cli.run(["--variant", "llvm_ad_rgb", "list"]) == 0
-    assert os.environ["AIRLIGHT_VARIANT"] == "llvm_ad_rgb"
 
 
 def test_every_public_name_can_be_imported(variant):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What `describe` says of a scene: for engines, for Cycles, its fog as a grid, and each file of a folder."""
+"""What `describe` says of a scene: for engines, for Cycles, its fog as a grid."""
 
 import json
 import math
@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 
 import airlight
-from analytic.errors import InputError
 from reference.quadrature.height_fog import fog_of
 from reference.scene.read import read_reference
 from reports.commands.main import run
 from reports.interchange.fog_grid import fog_grid, write_fog_grid
 from reports.interchange.scene import describe_scene, spot_power_angle
-from reports.interchange.words import describe_folder
 from tests.helpers.area_lights import lamp
 from tests.helpers.height_fog import LAMP, fog_xml
-from tests.helpers.scenes import bounded_medium, scene_xml, spot, tiny_scene
+from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import FOG_SCENES
 
@@ -222,27 +220,3 @@ def test_describe_writes_it(variant, tmp_path):
     assert mi.VolumeGrid(str(tmp_path / "smoke.vol")).max() == pytest.approx(4.7)
     with pytest.raises(airlight.InputError, match="the medium is no height fog and no grid"):
         airlight.describe("open-fog", output=tmp_path / "open.vol")
-
-
-OLD = '<float name="sigma_s" value="0.3"/><float name="sigma_a" value="0.1"/>'
-
-
-def test_each_file_has_its_outcome(variant, tmp_path):
-    (tmp_path / "old").mkdir()
-    (tmp_path / "good.xml").write_text(scene_xml())
-    (tmp_path / "old" / "mist.xml").write_text(scene_xml(fog=OLD))
-    (tmp_path / "projector.xml").write_text(scene_xml(LAMP.replace("point", "projector", 1)))
-    (tmp_path / "torn.xml").write_text("<scene")
-    log = describe_folder(tmp_path)
-    found = {each.file: each for each in log.of}
-    outcomes = {name: each.outcome for name, each in found.items()}
-    assert outcomes == {"good.xml": "taken", "old/mist.xml": "taken", "projector.xml": "refused", "torn.xml": "refused"}
-    assert found["good.xml"].words == ""
-    assert "sigma_t 0.4 and albedo 0.75" in found["old/mist.xml"].words
-    assert "projector" in found["projector.xml"].words
-    assert log.tables[0].title == "4 scene files: 2 taken, 2 refused"
-
-
-def test_a_folder_without_scenes_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"holds no \.xml file"):
-        describe_folder(tmp_path)

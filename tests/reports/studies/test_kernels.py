@@ -110,8 +110,6 @@ def test_slab_by_command_and_from_python(tmp_path):
 # Figures
 
 QUICK = {
-    "polynomials": {},
-    "map-size": {"scenes": "omni-box", "size": (16, 12), "sizes": "32,64"},
     "kernels": {"kernel": "taylor", "phase": "isotropic"},
     "slab": {"tau": 2, "sun": 30, "orders": "1,2", "photons": 50},
 }

@@ -86,16 +86,6 @@ def test_scaling_that_jumps_ends_with_1_and_is_drawn(variant, capfd, monkeypatch
         assert (tmp_path / "growth.png").stat().st_size > 1000
 
 
-def test_maps_print_errors_by_size(variant, capfd):
-    arguments = ["map-size", "omni-box", "--size", "16x12", "--sizes", "32,16"]
-    march = ["--method", "ray-march", "--set", "shadow=map", "--set", "steps=16"]
-    data = printed(capfd, *arguments, *march)
-    (scene,) = data["scenes"]
-    assert (scene["scene"], scene["label"]) == ("omni-box", "ray-march (shadow=map, steps=16)")
-    assert scene["maps"] == [16, 32]
-    assert all(metrics["relative_rmse"] > 0 for metrics in scene["errors"])
-
-
 def speckled(view, *, kernel=exact, bias=0.0):
     """All of the airlight, times a random number of each ray from 0 to 2."""
     return (1 + bias) * 2 * view.uniform()[0] * unshadowed(view, kernel=kernel)

@@ -231,7 +231,6 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
         ["render", "open-fog", "--size", "8x6", "--set", "steps=9999999999999"],
         ["reference", "open-fog", "--estimator", "volpath", "--samples", "100000000000"],
         ["study", "methods", "open-fog", "--size", "16384x16384"],
-        ["study", "map-size", "sphere-spot", "--size", "16384x16384", "--sizes", "32"],
     ],
     ids=" ".join,
 )
