@@ -31,9 +31,13 @@ if TYPE_CHECKING:  # the public names: editors complete them from here, and at r
     from realtime.frame.renderer import frame_renderer as frame_renderer
     from realtime.frame.renderer import render_frame as render_frame
     from realtime.kernels.registry import KERNELS as KERNELS
+    from realtime.methods.interface.marching import marched_steps as marched_steps
+    from realtime.methods.interface.method import Layers as Layers
     from realtime.methods.interface.method import Method as Method
     from realtime.methods.registry import METHODS as METHODS
     from realtime.methods.registry import find_method as find_method
+    from realtime.parameters import parameter as parameter
+    from realtime.scene.light_samples import light_tables as light_tables
     from realtime.scene.read_scene import read_scene as read_scene
     from reference.storage.exr import read_exr as read_exr
     from reference.storage.exr import write_exr as write_exr

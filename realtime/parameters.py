@@ -56,7 +56,7 @@ class Limits:
     most: float | None = None  #: largest value
     above: float | None = None  #: values are larger than this
     below: float | None = None  #: values are smaller than this
-    also: tuple[Any, ...] = ()  #: values outside that range that have a meaning of their own
+    also: tuple[Any, ...] = ()  #: values outside that range with a special meaning
     unit: str = ""
     wanted: str = ""  #: what a message asks for, where the range alone would not say it well
     check: Callable[[Any], None] | None = None  #: refuses what no range describes

@@ -41,7 +41,7 @@ _RESULTS = (
 
 
 def _public() -> dict[str, Any]:
-    """Return what `import airlight` gives, by name."""
+    """Return the public names of `airlight` with their values."""
     import airlight
 
     return {name: getattr(airlight, name) for name in sorted(airlight._API, key=str.lower)}
@@ -52,7 +52,7 @@ def _documented(value: Any) -> bool:
 
 
 def names() -> str:
-    """Return what `import airlight` gives: each name, in a sentence, with a link to its signature."""
+    """Return the public names of `airlight`, each with a sentence and a link to its signature."""
     import airlight
 
     rows = [

@@ -15,7 +15,7 @@ _WIDTH = "0.1667em"  # of the space around the name, which browsers leave out
 
 
 def markup(latex: str, *, block: bool) -> str:
-    """Return a formula in LaTeX as MathML, in a line of its own or inline; one that cannot be read ends the build."""
+    """Return a formula in LaTeX as MathML, as a block or inline; one that cannot be read ends the build."""
     try:
         formula = tex2mathml(latex, as_block=block).replace("&ApplyFunction;", _APPLIED)
     except Exception as error:  # a MathError, or an exception inside docutils

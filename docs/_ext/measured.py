@@ -46,7 +46,7 @@ def data() -> dict[str, Any]:
 
 @cache
 def kept_scenes() -> tuple[KeptScene, ...]:
-    """Return what is kept of every scene; what is not kept of a method or its errors is what it usually is."""
+    """Return the kept numbers of every scene; other keys of a method and its errors have their usual values."""
     usual = {"kind": "built-in", "layer": "airlight", "surface_error": None, "flip": None, "files": {}}
 
     def row(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -112,12 +112,12 @@ def method(name: str) -> str:
 
 
 def _inside(label: str) -> str:
-    """Return what stands in the brackets of a label: the kernel and the parameters."""
+    """Return the kernel and the parameters, which stand in the brackets of a label."""
     return label.split(" (", 1)[1].rstrip(")") if " (" in label else "-"
 
 
 def kernel_costs(phase: str) -> str:
-    """Return what kernels cost and how wrong they are for one phase function, the default sizes."""
+    """Return the costs and errors of kernels of the default sizes for one phase function."""
     from realtime.kernels.registry import KERNELS
 
     kernels = data()["kernels"]

@@ -14,7 +14,7 @@ _METHODS = ("sketch", "method", "error")  # in the order of a page
 
 @cache
 def kept() -> dict[str, Any]:
-    """Return what is known of each picture, by name."""
+    """Return the record of each picture, by name."""
     return json.loads((FOLDER / "gallery.json").read_text(encoding="utf-8"))["pictures"]
 
 
@@ -24,7 +24,7 @@ def strip() -> str:
 
 
 def pictures(method: str) -> str:
-    """Return what a method renders, its error and how it works, side by side, with captions."""
+    """Return the picture of a method, its error and its sketch, side by side, with captions."""
     shown = {kind: _of_method(method, kind) for kind in _METHODS}
     present = {kind: entry for kind, entry in shown.items() if entry}
     if not present:

@@ -46,7 +46,7 @@ def main() -> None:
 
 
 def read(path: str) -> dict[str, Any]:
-    """Return what `describe` says of Cycles."""
+    """Return the description of Cycles that `describe` gives."""
     with open(path, encoding="utf-8") as stream:
         return json.load(stream)["properties"]["Cycles"]
 

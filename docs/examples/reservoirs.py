@@ -19,10 +19,6 @@ import drjit as dr
 import mitsuba as mi
 
 import airlight
-from realtime.methods.interface.marching import marched_steps
-from realtime.methods.interface.method import Layers
-from realtime.parameters import parameter
-from realtime.scene.light_samples import light_tables
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class Reservoirs(airlight.Method):
     at_once = True
     noisy = True
 
-    candidates: int = parameter(8, "candidates of every ray", least=1)
+    candidates: int = airlight.parameter(8, "candidates of every ray", least=1)
 
     def check(self, scene):
         """Refuse lights at infinity, which have no angle."""
@@ -46,15 +42,15 @@ class Reservoirs(airlight.Method):
             raise airlight.InputError("reservoirs: needs lights that have a place; remove the directional ones")
 
     def preparation(self, scene):
-        """Return what makes tables of the lights: of points, of spots, of samples of area lights."""
-        return lambda now: light_tables(now.lights)
+        """Return the function that makes tables of the lights: of points, of spots, of samples of area lights."""
+        return lambda now: airlight.light_tables(now.lights)
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by chance [W/(m^2 sr)]."""
         total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
         for first, table in enumerate(state):
             total += self._reservoir(view, table, stream=first << 16)
-        return Layers(total)
+        return airlight.Layers(total)
 
     def _reservoir(self, view, table, stream):
         Float, lanes = type(view.distance), dr.width(view.pixel)
@@ -87,7 +83,7 @@ class Reservoirs(airlight.Method):
 def unshadowed(view, light, place):
     """Return the radiance of one sample of a light without shadows [W/(m^2 sr)], and where it is [m]."""
     rays = view.lit_by(light)
-    span = marched_steps(rays, view.distance, 1, "equiangular")
+    span = airlight.marched_steps(rays, view.distance, 1, "equiangular")
     x = span.place(dr.fma(place, span.width, span.begin))
     value = rays.source(x) * (span.stretch(x) * span.width)
     return rays.radiance(dr.select(span.width > 0, value, 0)), view.at(x)

@@ -147,7 +147,7 @@ def _to_ball(origin: Array, way: Array) -> Array:
 
 
 def _light(engine: Engine, lamp: Lamp, point: Array, shadows: bool) -> tuple[Array, Array, Array]:
-    """Return what a lamp sends to points without its colour, the unit direction to it, and the distance."""
+    """Return the light of a lamp at points without its colour, the unit direction to it, and the distance."""
     way = np.array(lamp.place) - point
     r = np.linalg.norm(way, axis=-1)
     way = way / r[..., None]

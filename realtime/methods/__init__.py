@@ -13,6 +13,6 @@ Read in this order:
 - `cloud_octaves.py`: clouds as engines render them.
 - `cloud_collectors.py`: light of many orders in clouds, from where it enters them.
 - `registry.py`: the methods by name, and how a name becomes a method.
-- `shader/`: a user's shader, drawn by OpenGL in a process of its own.
+- `shader/`: a user's shader, drawn by OpenGL in a separate process.
 - `user_method.py`: a user's plain function or class, made a method with its errors named and its results checked.
 """

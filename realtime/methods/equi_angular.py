@@ -11,7 +11,7 @@ bounded (Kulla and Fajardo 2012, section 4). Sample k of S takes the fraction (k
 pattern, and another place for each k, by the step of Roberts' sequence in one dimension of two; the mean of all stays
 the integral, since each sample alone is right in the mean.
 
-Lights of different structure (points, spots, samples of area lights) are in tables of their own, and one of each is
+Lights of different structure (points, spots, samples of area lights) are in separate tables, and one of each is
 sampled. Lights at infinity have one sample each, even in the distance.
 
 References

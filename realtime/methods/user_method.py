@@ -98,7 +98,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
     what = {
         "name": name,
         "summary": _summary(function),
-        "source": _file(function) or "one's own",
+        "source": _file(function) or "the user",
         "uses_kernel": takes_kernel,
         "casts_rays": True,
         "frozen": bool(getattr(function, "frozen", False)),
@@ -195,7 +195,7 @@ def _from_path(module_name: str, what: str) -> ModuleType:
 
 
 def _from_file(path: Path, what: str) -> ModuleType:
-    """Import a file under a name of its own, again where it was changed since: in a notebook it will be."""
+    """Import a file under a name of its own, again if it has changed since, as in a notebook."""
     if not path.is_file():
         raise InputError(f"{what}: there is no file {path}; {_WANTED}")
     place = path.resolve()
@@ -281,7 +281,7 @@ def _file(function: Any) -> str | None:
 
 def _summary(function: Any) -> str:
     text = inspect.getdoc(function) if inspect.isfunction(function) else None
-    return text.splitlines()[0] if text else "a method of one's own"
+    return text.splitlines()[0] if text else "a user method"
 
 
 _RESULT = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"

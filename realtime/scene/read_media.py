@@ -251,7 +251,7 @@ def _in_channels(medium: Homogeneous, channels: int) -> Homogeneous:
     if len(medium.sigma_t) == channels:
         return medium
     (grey,) = medium.sigma_t
-    # Each channel has an array of its own: a recorded frame tells arrays that are one from arrays that are equal.
+    # Each channel has its own array: a recorded frame tells arrays that are one from arrays that are equal.
     return replace(medium, sigma_t=tuple(dr.opaque(type(grey), float(grey[0])) for _ in range(channels)))
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Batches of a Monte Carlo estimator: their means and the spread between them, in float64.
 
-An estimator traces one batch at a time, each with a seed of its own. The standard error of the mean follows from the
+An estimator traces one batch at a time, each with its own seed. The standard error of the mean follows from the
 spread of the batch means, so nothing needs to be known of the law of a single sample.
 """
 

@@ -7,7 +7,7 @@ sums, nor the near clip plane come into play; what remains of Mitsuba's biases i
 (`reference.scene.shadow_epsilon`).
 
 Airlight and surface come apart by two runs: with black surfaces only the medium scatters, with albedo 0 only surfaces
-do. Where the extinction depends on the channel, each channel has a run of its own in grey media, since a path that
+do. Where the extinction depends on the channel, each channel has its own run in grey media, since a path that
 picks its channel at random may have infinite variance (DESIGN section 6.7). Boundaries of media are of type 'null':
 paths go through them without counting an edge, and they stay as they are when surfaces turn black.
 
@@ -141,7 +141,7 @@ def trace(reference: ReferenceScene, integrator, seed: int, counts: Counts, *, s
         channels = np.all(extinctions == sigma_t, axis=1)
         with _grey_media(reference, int(np.argmax(channels)), scattering) as medium:
             for place, part in enumerate(parts):
-                # Streams differ by seed; the part and the channel get seeds of their own.
+                # Streams differ by seed; the part and the channel get their own seeds.
                 stream = (seed * 3 + number) * len(parts) + place
                 image[part, channels] = _trace_pixels(reference, integrator, medium, part, stream, counts[part])[
                     :, channels

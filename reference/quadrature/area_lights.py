@@ -8,7 +8,7 @@ With the points y on the surface of a light of radiance Le the radiance along a 
 
 The inner integral is that of a point light with a cosine for its profile, cut where the ray passes the plane of y and
 n. It is continuous in y where the visibility from a surface is not, so that few samples suffice. Surfaces at the end of
-a ray receive, from samples of their own,
+a ray receive, from their own samples,
 
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 

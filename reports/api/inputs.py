@@ -141,7 +141,7 @@ def pixels_of(size: Any) -> tuple[int, int] | None:
 
 
 def changes_of(change: Any) -> dict[str, tuple[float, ...]]:
-    """Return what differs from the scene as it is, by name."""
+    """Return the changes of a scene by name."""
     from validation.scenes.changes import parse_changes
 
     if isinstance(change, Mapping):

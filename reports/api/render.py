@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.load_scene` and `airlight.render`: a frame or an animation by a real-time method, and what it costs.
 
-A user's method that is named, 'module:function' or 'file.py:function', runs in a process of its own, which it may end
+A user's method that is named, 'module:function' or 'file.py:function', runs in a separate process, which it may end
 or never leave. A function that Python gives runs here.
 """
 
@@ -227,7 +227,7 @@ def _check(
 def checked_configuration(method: Any, kernel: Any = None, parameters: Any = None) -> "tuple[Configuration, bool]":
     """Return a configuration, checked, and whether its code is a user's that is named.
 
-    Such code is imported in a process of its own, never here.
+    Such code is imported in a separate process, never here.
     """
     from realtime.methods.shader.source import is_shader
     from reports.machine.opengl import require_opengl
@@ -387,7 +387,7 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
 
 
 def _plan(asked: _Asked) -> "Said":
-    """Return what a scene needs of a method."""
+    """Return the features that a scene needs."""
     from realtime.methods.registry import find_method
     from realtime.methods.shadow_planes.method import ShadowPlanes, occluders_in_words
     from realtime.parameters import values
@@ -414,7 +414,7 @@ def _plan(asked: _Asked) -> "Said":
 
 
 def _warnings(renderer: Any) -> tuple[str, ...]:
-    """Return what planes in an order of a paper do not count right, said on the error stream too."""
+    """Return the faults of planes in the order of a paper, and print them on the error stream."""
     import sys
 
     from realtime.methods.shadow_planes.method import PlanePreparation
@@ -440,7 +440,7 @@ _KERNEL = "kernel="  # begins a setting that names a kernel
 def asked_configurations(
     methods: Any, kernels: Any, settings: Any, *, usual: Any = None
 ) -> "tuple[list[Configuration], bool]":
-    """Return what to measure, and whether all user code among it is named, so that it can run in other processes.
+    """Return the configurations to measure, and whether all user code is named: it can then run in other processes.
 
     A method is a name, a function or a configuration. A name without kernel and settings stands for its standard
     configurations; 'all', the default, for `usual`, or those of every built-in method for fog. Every method is measured

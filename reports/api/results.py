@@ -180,7 +180,7 @@ class Rendering(LayeredImage):
     files: tuple[str, ...] = ()  #: that were written
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight render --json` prints: the times are there if they were measured [ms]."""
+        """Return the data that `airlight render --json` prints, with times [ms] if they were measured."""
         data: dict[str, Any] = {"scene": self.scene, "method": self.label, "size": list(self.size)}
         if self.times is not None:
             times = self.times.medians
@@ -250,7 +250,7 @@ class Reference(LayeredImage):
         return self.image.layers.get("surface_se")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight reference --json` prints, without the files."""
+        """Return the data that `airlight reference --json` prints, without the files."""
         means = {name: layer.mean(axis=(0, 1)).tolist() for name, layer in self.image.layers.items()}
         names = (name for name in _MADE if f"airlight:{name}" in self.image.attributes)
         data: dict[str, Any] = {"scene": self.scene, "estimator": self.estimator, "means": means}

@@ -154,7 +154,7 @@ def _quiet() -> None:
 
 
 def facts() -> Any:
-    """Return what a worker is made of, `validation.study.keys.Made`."""
+    """Return the versions and source code of this process, `validation.study.keys.Made`."""
     from reports import __version__
     from reports.machine.environment import activate
     from validation.study.keys import made_here

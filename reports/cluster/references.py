@@ -78,7 +78,7 @@ def tracing(
     orders: tuple[str, ...] | None = None,
     counts: NDArray[np.integer] | None = None,
 ) -> Elsewhere:
-    """Return what lets workers trace the batches of an estimator, `batches` of them, None where an error decides.
+    """Return the function that lets workers trace `batches` batches of an estimator, None if an error decides how many.
 
     The rest is as for `validation.estimates.monte_carlo.monte_carlo_batches`.
     """
@@ -95,7 +95,7 @@ def tracing(
 
 
 def spread(cluster: Client, picture: Picture) -> ElsewhereFor:
-    """Return what lets workers trace the batches that check a reference."""
+    """Return the function that lets workers trace the batches that check a reference."""
     return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
 
 

@@ -84,7 +84,7 @@ _ENDINGS = {reference: (".exr",)}  #: of what -o writes, where it is not a study
 
 
 def _shown_default(value: Any) -> Any:
-    """Return what the help says of a default, nothing of one that says nothing."""
+    """Return a default as the help shows it, None for an empty one."""
     return None if value in (None, False, (), "") else ", ".join(value) if isinstance(value, tuple) else str(value)
 
 
@@ -257,7 +257,7 @@ def run(arguments: Sequence[str]) -> int:
         return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
         words = list(arguments)
-        if words[:1] == ["test"] and "--" not in words:  # pytest has options of its own
+        if words[:1] == ["test"] and "--" not in words:  # pytest has its own options
             ours = [word for word in words[1:] if word in ("--all", "--help", "-h")]
             words = ["test", *ours, "--", *(word for word in words[1:] if word not in ours)]
         app = make_app(words)

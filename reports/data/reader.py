@@ -44,7 +44,7 @@ def load_report(path: Path | str) -> tuple[Report, Path]:
 
 
 def read_json(path: Path, wanted: str) -> Any:
-    """Return what is in a JSON file; `wanted` says in words what it should be.
+    """Return the content of a JSON file; `wanted` says in words what it should be.
 
     A number that is not finite stays the word that stands there, so that no record takes it.
     """
@@ -101,7 +101,7 @@ def record_types(kind: Any = Report) -> dict[str, type]:
 
 
 def meanings(record: Any, *, units: bool = False) -> dict[str, str]:
-    """Return what the keys of a record mean, with their units where that is asked for."""
+    """Return the meanings of the keys of a record, with `units` also their units."""
     said = {each.name: each.metadata.get("column", ("", None, "")) for each in fields(record)}
     return {
         name: f"{meaning} [{unit}]".strip() if units and unit else meaning for name, (_, unit, meaning) in said.items()

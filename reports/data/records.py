@@ -37,7 +37,7 @@ class Measured:
 class Settings:
     """The settings of the study."""
 
-    name: str = column(meaning="`quick`, `default`, `full`, or that of a study of one's own")
+    name: str = column(meaning="`quick`, `default`, `full`, or the name of a user's study")
     scenes: tuple[str, ...] = column(meaning="the scenes of the report")
     image: Size = column(unit="pixels", meaning="width and height of the images")
     timed: Size = column(unit="pixels", meaning="of the frames that are timed")

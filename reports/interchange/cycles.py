@@ -45,7 +45,7 @@ _KINDS = {"point": "POINT", "spot": "SPOT", "directional": "SUN"}
 
 
 def cycles_properties(described: dict[str, Any]) -> dict[str, Any]:
-    """Return what to create in Blender and which properties to assign, from what `describe_scene` found.
+    """Return the objects to create in Blender and the properties to assign, from a description by `describe_scene`.
 
     `scene`, `image_settings` and `layered_image_settings` are properties by name. `camera` and each of `lights` have
     `data` (properties) and `matrix_world` (4 x 4, rows); lights also `type`. `world` and each of `media`, by mesh, have

@@ -95,7 +95,7 @@ def up_axis(up: Array) -> str:
 
 
 def surface(shape: Any) -> dict[str, Any]:
-    """Return what an opaque shape is and how much light it reflects."""
+    """Return the kind of an opaque shape and the light that it reflects."""
     import mitsuba as mi
 
     from reports.interchange.meshes import triangle_count

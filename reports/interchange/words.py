@@ -24,7 +24,7 @@ Cells = tuple[str, str, str]  # what it is, which part of it, and its value
 
 
 def description_table(described: Mapping[str, Any]) -> Table:
-    """Return what `reports.interchange.scene.describe_scene` found, a row for each number to set."""
+    """Return a description by `reports.interchange.scene.describe_scene`, a row for each number to set."""
     width, height = described["camera"]["size"]
     title = f"{described['scene']}, {width} x {height} pixels. {described['purpose']}"
     columns = (

@@ -12,6 +12,6 @@ Read in this order:
 - `gpu.py`: whether CUDA and OptiX work, and why not
 - `mitsuba_log.py`: Mitsuba's warnings on the error stream, each once
 - `environment.py`: chooses the variant; versions and processor
-- `own_process.py`: the user's code, and kernels that compile quickly, in a process of their own
+- `own_process.py`: the user's code, and kernels that compile quickly, in a separate process
 - `doctor.py`: examines all of these
 """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.doctor`: every part that a kernel needs, then a kernel itself, and what is cached between runs.
 
-The kernel has a process of its own, because what can go wrong there ends the process: a libLLVM that aborts, a driver
+The kernel has a separate process, because what can go wrong there ends the process: a libLLVM that aborts, a driver
 that crashes.
 
     python -m reports.machine.doctor
@@ -100,7 +100,7 @@ class Doctor(Result):
         return self.machine.works
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `airlight doctor --json` prints."""
+        """Return the data that `airlight doctor --json` prints."""
         return asdict(self.machine) | {"cache": asdict(self.cache)}
 
     @property
@@ -218,7 +218,7 @@ def diagnose() -> Machine:
 
 
 def try_kernel(variant: str) -> Kernel:
-    """Run a kernel in a process of its own; raises EndedError or MissingError where it does not work."""
+    """Run a kernel in a separate process; raises EndedError or MissingError where it does not work."""
     start = time.perf_counter()
     kernel = in_own_process(probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant)
     return replace(kernel, seconds=time.perf_counter() - start)

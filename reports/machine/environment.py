@@ -214,7 +214,7 @@ def stamped(image: "Image") -> "Image":
 
 
 def describe_environment() -> dict[str, object]:
-    """Return what made the numbers, as JSON-ready data, for the head of a report."""
+    """Return the software and hardware that make the numbers, as JSON-ready data."""
     import platform
 
     mitsuba = sys.modules.get("mitsuba")
@@ -235,13 +235,13 @@ def describe_environment() -> dict[str, object]:
 
 
 def machine() -> dict[str, str]:
-    """Return what times depend on, for the keys of results that hold some."""
+    """Return the parts of the environment that times depend on, for the keys of results with times."""
     environment = describe_environment()
     return {name: str(environment.get(name)) for name in ("processor", "threads", "variant", "llvm", "device")}
 
 
 def machine_in_words(environment: Mapping[str, Any]) -> str:
-    """Return what stands beside times in tables, from `describe_environment`: the GPU first, where there is one."""
+    """Return the machine in a line, from `describe_environment`: the GPU first, if there is one."""
     device = f"{environment['device']}, " if environment.get("device") else ""
     return f"{device}{environment['processor']}, {environment['threads']} threads, {environment['variant']}"
 

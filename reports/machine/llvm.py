@@ -105,7 +105,7 @@ def _version_of_name(path: str) -> tuple[int, int] | None:
 
 
 def _version_asked(path: str) -> tuple[int, int] | None:
-    """Load the library in a process of its own and ask it; slow, for names that do not tell."""
+    """Load the library in a separate process and ask it; slow, for names that do not tell."""
     command = [sys.executable, "-c", _ASK_VERSION, path]
     try:
         answer = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True).stdout.split()

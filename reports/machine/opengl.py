@@ -38,7 +38,7 @@ def opengl_status(*, judged: bool = True) -> Status:
 
 @cache
 def require_opengl() -> str:
-    """Return what draws shaders here, with its error; raise MissingError where nothing does, or wrongly."""
+    """Return the device that draws shaders, with its error; raise MissingError if none does, or if it is wrong."""
     status = opengl_status()
     if not status.works:
         raise MissingError(status.reason)

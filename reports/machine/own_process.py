@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A function run in a process of its own: the user's code, which may end the process or never return, and work of ours
+"""A function run in a separate process: the user's code, which may end the process or never return, and work of ours
 whose kernels are to compile quickly.
 
 The caller sends the name of one of our functions with arguments that name scenes and methods; the process imports the

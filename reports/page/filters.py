@@ -108,7 +108,7 @@ _METHODS = (
 
 
 def methods(scene: Scene) -> Table:
-    """Return what the methods of a scene cost and how wrong they are."""
+    """Return the times and errors of the methods of a scene."""
     shadows = scene.plan["shadows"].startswith("vis")
 
     def row(entry: MethodRow) -> Row:
@@ -126,7 +126,7 @@ def methods(scene: Scene) -> Table:
 
 
 def facts(title: str, entries: Any) -> Table:
-    """Return what is known by name, of a mapping or a record."""
+    """Return the entries of a mapping or a record that are known."""
     known = entries if isinstance(entries, Mapping) else asdict(entries)
     columns = (Column("name", "", words=True), Column("value", "", words=True, long=True))
     return table(

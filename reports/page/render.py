@@ -73,7 +73,7 @@ def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str
 
 
 def page_environment() -> "jinja2.Environment":
-    """Return what renders the templates: those of every page, filters, and how claims are marked."""
+    """Return the environment that renders the templates, with the filters and the marks of claims."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -96,7 +96,7 @@ def template_text(name: str) -> "Markup":
 
 
 def _viewer(scene: Scene, number: int, images: SceneImages, *, chart: str, folder: Path | None) -> dict[str, Any]:
-    """Return what the viewer of a scene shows; with a folder also its first pictures, which need no script."""
+    """Return the values of the template of a viewer; with a folder also its first pictures, which need no script."""
     shown = [entry for entry in scene.methods if entry.files]
     first = _first_shown(shown)
     files = shown[first].files

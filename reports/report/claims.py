@@ -109,7 +109,7 @@ def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
         filled = {_place(*pair): worst_interval([pair[1]]) for pair in good}
         place, (worst, most) = max(filled.items(), key=lambda item: item[1][1])
         low, high = (100 * (end or 0.0) for end in worst.statistics.relative_bias_ci)
-        # Under area lights the reference has errors of its own, and the margin is wider.
+        # Under area lights the reference has its own errors, and the margin is wider.
         text = (
             f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
             f"of the pooled relative bias lies within its margin. The interval that fills most of its margin, "
@@ -188,7 +188,7 @@ def _without_flip(scenes: Scenes) -> list[Claim]:
 
 
 def own_fault(method: str, refused: str | None) -> str | None:
-    """Return what a user method did wrong: what it refuses by name is a result, its faults are not.
+    """Return the fault of a user method, None for none; a refusal by name is a result and no fault.
 
     They begin with the name of the method (`realtime.methods.user_method`, `realtime.methods.shader`,
     `reports.machine.own_process`).
@@ -197,6 +197,6 @@ def own_fault(method: str, refused: str | None) -> str | None:
 
 
 def own_faults(methods: Iterable[MethodRow]) -> list[str]:
-    """Return what user methods did wrong, each once."""
+    """Return the faults of user methods, each once."""
     faults = (own_fault(row.method, row.refused) for row in methods if row.kind == "function")
     return list(dict.fromkeys(filter(None, faults)))

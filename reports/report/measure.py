@@ -67,7 +67,7 @@ def write_report(
 
     Only the first of the sizes and media of the study counts. `images` from elsewhere are judged, by scene, at their
     size. The page names `command` under "how to reproduce". `fresh` computes everything again. With `apart` user
-    methods run in processes of their own, where a fault becomes a row (`own_faults`); else it ends the report. `noted`
+    methods run in separate processes, where a fault becomes a row (`own_faults`); else it ends the report. `noted`
     is called with notes on the scenes before the work. Workers of `cluster` compute references and the batches that
     check them; methods run here. Unusable input is refused, and an existing report is not damaged.
     """
@@ -166,7 +166,7 @@ def write_report(
 
 
 def settings(study: Study) -> Settings:
-    """Return what a study asked for."""
+    """Return the settings of a study."""
     measure, checks = study.measure, study.checks
     asked = {
         **vars(checks),
@@ -192,7 +192,7 @@ def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
 
 
 def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None":
-    """Return what lets workers trace the batches that check the reference of a scene."""
+    """Return the function that lets workers trace the batches that check the reference of a scene."""
     if cluster is None:
         return None
     from reports.cluster.references import spread

@@ -72,14 +72,14 @@ def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> Method:
 
 
 def row_record(row: Row, files: Mapping[str, str]) -> MethodRow:
-    """Return what a report says of a row, with the names of its files."""
+    """Return the record of a row in a report, with the names of its files."""
     own = {name: getattr(row, name) for name in (each.name for each in fields(MethodRow)) if hasattr(row, name)}
     own |= {"parameters": json.loads(row.parameters), "refused": row.reason, "left_out": row.status == "left out"}
     return MethodRow(**own, files=files)
 
 
 def reference_record(reference: ReferenceImage) -> Reference:
-    """Return what the quadrature reference says of its errors, without its images."""
+    """Return the accuracy of a quadrature reference, without its images."""
     finite = np.isfinite(reference.airlight)
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")

@@ -153,7 +153,7 @@ def _slab_tables(found: Mapping[str, Any]) -> Iterator[Table]:
 
 
 def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
-    """Return what leaves a slab by order, and how far from the entry, computed and by photons."""
+    """Return the light that leaves a slab by order, and its distance from the entry, computed and by photons."""
     import numpy as np
 
     from reports.plotting.figure import new_figure

@@ -50,7 +50,7 @@ def scene_by_scene(loaded: list[Any], title: str, progress: Any) -> Iterator[tup
 def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Any, Callable[[Any], tuple[Any, Any]]]:
     """Return a scene as methods see it, its reference, and what gives row and frame of a configuration beside it.
 
-    Methods of users run in processes of their own if they can be found there, `apart`.
+    Methods of users run in separate processes if they can be found there, `apart`.
     """
     from realtime.scene.read_scene import read_scene
     from reports.machine.own_process import in_own_process

@@ -2,7 +2,7 @@
 """The figures of a sweep: for the page as SVG, for papers as PDF.
 
 A sweep has a thousand scenes and a dozen configurations or more. No panel tells a dozen colours apart, so that every
-configuration has a line of its own.
+configuration has its own line.
 """
 
 from collections.abc import Iterator

@@ -124,7 +124,7 @@ def _reading(file: Path) -> Iterator[None]:
 
 
 def natural(text: str) -> tuple[str | int, ...]:
-    """Return what sorts text as a reader does: random:9 before random:10."""
+    """Return the key that sorts text as a reader does: random:9 before random:10."""
     return tuple(int(part) if place % 2 else part for place, part in enumerate(re.split(r"(\d+)", text)))
 
 
@@ -273,7 +273,7 @@ def _size(sweep: Sweep, row: int) -> str:
 
 
 def _statuses(sweep: Sweep) -> Texts:
-    """Return what became of every row, and of those whose scene has no reference `UNTOLD`."""
+    """Return the status of every row; rows whose scene has no reference are `UNTOLD`."""
     reasons = zip(sweep.texts("status"), sweep.texts("reason"))
     untold = [status in FAULTS and (reason or "").startswith(NO_REFERENCE) for status, reason in reasons]
     return np.where(untold, UNTOLD, sweep.texts("status"))

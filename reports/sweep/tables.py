@@ -55,7 +55,7 @@ def errors_table(said: Summary) -> Table:
 
 
 def speed_table(said: Summary) -> Table:
-    """Return what each configuration costs, and in how many scenes it is the fastest within an error."""
+    """Return the cost of each configuration, and in how many scenes it is the fastest within an error."""
     columns = (
         *words(label="method"),
         *numbers(timed="scenes timed"),

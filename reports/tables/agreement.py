@@ -114,7 +114,7 @@ def _trust(scene: Scene, estimators: Iterable[str]) -> Row:
 
 
 def agreement_table(scene: Scene) -> Table:
-    """Return what estimators say of the reference of a scene of report.json."""
+    """Return the comparisons of the reference of a scene with the estimators."""
     return table(
         f"Monte Carlo estimators against the quadrature in {scene.name}",
         COLUMNS,

@@ -32,7 +32,7 @@ def kernel_tables(costs: Iterable[KernelCost], levels: Iterable[ErrorLevel]) -> 
 
 
 def cost_table(title: str, costs: Iterable[KernelCost], *, code: bool = False) -> Table:
-    """Return what kernels cost and how wrong they are; their names as code where they are for typing."""
+    """Return the costs and errors of kernels, with `code` for names that a reader types."""
     return Table(title, COSTS, tuple(_cost_row(cost, code) for cost in costs))
 
 

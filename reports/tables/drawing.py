@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""One table drawn five ways: `text` for a terminal, `markdown`, `html`, `latex`, `csv`.
 
-All five show the same cells. Where a cell has no room for quartiles they are a column of their own (text, Markdown) or
+All five show the same cells. Where a cell has no room for quartiles they are a separate column (text, Markdown) or
 two (CSV). Why a row ends early, and remarks on it, stand in the row (HTML, LaTeX), below the table (text, Markdown) or
 in columns at the end (CSV).
 
@@ -180,7 +180,7 @@ def html(table: Table) -> str:
 
 
 def _meanings(columns: Sequence[Column]) -> list[str]:
-    """Return what the columns mean, to be unfolded below a table."""
+    """Return the meanings of columns, to be unfolded below a table."""
     explained = [column for column in columns if column.meaning]
     if not explained:
         return []
@@ -274,7 +274,7 @@ def _cell(value: Value, column: Column, style: _Style) -> str:
     return written(value) + after
 
 
-# Text and Markdown: quartiles in a column of their own, reasons below the table.
+# Text and Markdown: quartiles in a separate column, reasons below the table.
 
 
 def _with_spreads(columns: Iterable[Column]) -> list[Column]:

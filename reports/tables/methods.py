@@ -80,7 +80,7 @@ def methods_table(title: str, methods: Iterable[MethodRow | Row], *keys: str, ex
 
 
 def method_row(entry: MethodRow, *, shadows: bool = False) -> Row:
-    """Return what a method costs and how wrong it is as a row; with `shadows` a method that knows none is marked."""
+    """Return the costs and errors of a method as a row; `shadows` marks a method that knows none."""
     users = "user's shader" if is_shader(entry.method) else "user's function"
     remarks = [f"image, {entry.layer}"] if entry.kind == "image" else [users] if entry.kind == "function" else []
     if shadows and entry.kind != "image" and not entry.knows_shadows:

@@ -95,7 +95,7 @@ class Result:
         return plain(self)
 
     def text(self, *, width: int | None = None, styled: bool = False) -> str:
-        """Return what it says for a terminal."""
+        """Return the claims, tables and lines for a terminal."""
         claims = "".join(f"- {sentence_in_text(claim)}\n" for claim in self.claims)
         drawn = [text(table, width=width, styled=styled) for table in self.tables]
         lines = [*([""] if drawn and self.lines else []), *self.lines]

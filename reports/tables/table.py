@@ -71,7 +71,7 @@ class Column:
     sign: bool = False  #: positive numbers have a plus
     percent: bool = False  #: a fraction, written in per cent
     fraction: bool = False  #: a fraction that HTML writes in per cent and the others as it is
-    spread: str = ""  #: heading of the quartiles of `Measured`, in a column of their own where cells have no room
+    spread: str = ""  #: heading of the quartiles of `Measured`, in a separate column where cells have no room
     alarm: bool = False  #: anything but zero is bad
     meaning: str = ""  #: what its values are, in words; HTML explains it below the table
     minor: bool = False  #: left out first where a terminal is narrow

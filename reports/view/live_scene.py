@@ -139,7 +139,7 @@ class LiveScene:
         return 1e3 * (time.perf_counter() - begin)
 
     def shader_stamp(self) -> tuple[Any, ...]:
-        """Return what tells the files of the shader that is shown from what they were; nothing of another method."""
+        """Return a stamp of the files of the shader that is shown, which changes with them; None for another method."""
         files = self.renderer.method.shader.files if isinstance(self.renderer.method, Shader) else ()
         return tuple((str(file), file.stat().st_mtime_ns) for file in files if file.is_file())
 

@@ -209,7 +209,7 @@ def compute(pipe: Connection, variant: str) -> None:
 class ReferenceInBackground:
     """A process that computes references, and what it has found for the last task.
 
-    `told` is called in a thread of its own whenever more is known.
+    `told` is called in a separate thread whenever more is known.
     """
 
     def __init__(self, told: Callable[[], None], variant: str) -> None:

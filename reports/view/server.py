@@ -60,7 +60,7 @@ class Page:
 class Server:
     """The server of one view; port 0 is any free one.
 
-    `opened`, `told`, `closed` are called in threads of their own: with a page that was opened, with a page and what it
+    `opened`, `told`, `closed` are called in separate threads: with a page that was opened, with a page and what it
     says, with a closed page.
     """
 

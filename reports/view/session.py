@@ -402,7 +402,7 @@ def sparing(method: str, kernel: Any, given: Mapping[str, Any]) -> Configuration
 
 
 def _chooses(message: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Return what a message of the page chooses, without its value."""
+    """Return the choice that a message of the page makes, without its value."""
     return message.get("kind"), "method" in message, "kernel" in message, message.get("parameter")
 
 

@@ -74,7 +74,7 @@ def calls_kernel(chosen: Configuration) -> bool:
 
 
 def scene_widgets(there: dict[str, Changeable]) -> list[dict[str, Any]]:
-    """Return what can be changed in a scene, with values and ranges."""
+    """Return the changeable numbers of a scene, with values and ranges."""
     return [
         {"name": item.name, "value": item.value, "least": item.least, "most": item.most, "unit": item.unit}
         for item in there.values()

@@ -9,7 +9,7 @@ the fifth, with one packet an entry,
 where P_s, the phase function scattered n times, holds lobe, glory and fogbow, and 1 - exp(-L), with L the way from the
 point back to where the line of sight enters the slab, leaves the mean of the source along that way, which is finite and
 smooth at mu = 0 and at both faces. Q_0(t, d, mu_L) is Q of one level direction: deep in thick slabs it falls by many
-powers of e, so that it has a grid of its own, of three dimensions and finer. Between computed entries it is a spline,
+powers of e, so that it has its own grid, of three dimensions and finer. Between computed entries it is a spline,
 of what is left of it without the steep powers r of thickness and depth that an order has by itself
 (`coordinates.steep_powers`).
 

@@ -187,8 +187,8 @@ class Method(Parameters):
     """
 
     name: ClassVar[str] = ""
-    summary: ClassVar[str] = "a method of one's own"  #: what it does, for tables
-    source: ClassVar[str] = "one's own"  #: the paper
+    summary: ClassVar[str] = "a user method"  #: what it does, for tables
+    source: ClassVar[str] = "the user"  #: the paper
     shadows: ClassVar[bool] = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate the surfaces, and has
     #: `Layers.extra` by order of scattering.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shaders as methods: GLSL of a user's, run by OpenGL in a process of its own.
+"""Shaders as methods: GLSL of a user's, run by OpenGL in a separate process.
 
-Mesa's drivers bring a libLLVM of their own, which must not meet the one of Dr.Jit: the host imports nothing but NumPy
+Mesa's drivers bring their own libLLVM, which must not meet the one of Dr.Jit: the host imports nothing but NumPy
 and moderngl, is handed the scene as arrays, and answers with images. It draws without a window, by EGL.
 
 Read in this order:

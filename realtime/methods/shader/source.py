@@ -11,7 +11,7 @@ A size is made of numbers, W, H, W/n and H/n, rounded up. A pass in 2D is a func
 ``vec4 NAME(ivec3 cell, ivec3 cells)``. Lines ``#include "file"`` are resolved beside the file that has them.
 
 Drivers differ in what they make of the second number of `#line` (Mesa 22.3 forgets it), so every text has lines of its
-own: the user's file from 1, an included one from a million of its own.
+own: the user's file from 1, an included one from a separate million.
 """
 
 import keyword

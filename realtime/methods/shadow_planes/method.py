@@ -337,7 +337,7 @@ def _segments(view: View, index: PlaneIndex, rays: RayPlanes, airlight: LitRays,
 
 
 def occluders_in_words(scene: Scene) -> dict[str, str]:
-    """Return what the occluders of a scene are and which planes its camera needs, one entry for each decision.
+    """Return the kinds of occluders and the planes that the camera needs, one entry for each decision.
 
     Raises InputError for an occluder without triangles.
     """

@@ -405,7 +405,7 @@ def _padded(values, multiple: int = 1):
     """Return an array with zeros up to a power of two times `multiple`, aligned to 64 bytes.
 
     A frozen function is recorded again where arrays that had one size have two or the other way round, and where the
-    alignment of an array is another; so each kind of array has a multiple of its own.
+    alignment of an array is another; so each kind of array has its own multiple.
     """
     size = multiple << max(6, int(-(-len(values) // multiple) - 1).bit_length())
     room = np.zeros(size * values.itemsize + 64, dtype=np.uint8)

@@ -66,7 +66,7 @@ def cloud_paths_batch(
         for place, first in enumerate(range(0, len(pixels), _LANES // streams)):
             part = pixels[first : first + _LANES // streams]
             sampler = mi.load_dict({"type": "independent"})
-            # Streams differ by seed: each part of the pixels and each channel has seeds of its own.
+            # Streams differ by seed: each part of the pixels and each channel has its own seeds.
             sampler.seed((seed * 3 + number) * (1 + len(pixels) * streams // _LANES) + place, len(part) * streams)
             directions = dr.normalize(mi.Vector3f(np.repeat(clouds.direction[part], streams, axis=0).T))
             rays = mi.Ray3f(mi.Point3f(*(float(c) for c in clouds.origin)), directions)

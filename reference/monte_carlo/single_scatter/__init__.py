@@ -6,7 +6,7 @@ Read in this order:
 - `distance_sampling.py`: distances along a ray: equi-angular, uniform and free-flight sampling combined;
 - `boundary_walk.py`: optical depth and visibility through the boundaries of media;
 - `stretches.py`: camera rays, their parts in media, cells of samples;
-- `varying_media.py`: parts in height fog and density grids, with optical depths of their own;
+- `varying_media.py`: parts in height fog and density grids, with their own optical depths;
 - `area_sampling.py`: points on area lights;
 - `sources.py`: the light that samples receive;
 - `estimator.py`: the estimate of one camera ray;

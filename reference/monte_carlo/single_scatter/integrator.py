@@ -56,7 +56,7 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
 
 
 def _task(reference: ReferenceScene, samples: int) -> Task:
-    """Return what is traced, of a scene that was read."""
+    """Return the traced form of a scene that was read."""
     bounded, media = bool(reference.media), (reference.medium, *reference.media)
     # Shapes of material `null` that bound no homogeneous medium, lights among them, take no part.
     scene = reference.scene if bounded else reference.occluders

@@ -159,7 +159,7 @@ class AreaSource(_Near):
 
 @dataclass(frozen=True)
 class FarSource:
-    """A sun, or a uniform sky, of which each sample asks in a direction of its own: evenly from the sphere.
+    """A sun, or a uniform sky, of which each sample has its own direction, evenly from the sphere.
 
     The emitter names a place beyond everything, in vacuum: there paths begin.
     """
