@@ -153,7 +153,7 @@ def computed():
     slab = moments.SlabOrders(TAU, MU0, HenyeyGreensteinPhase(0.5), ALBEDO, depths=[DEPTH], streams=16)
     sets, _ = moments.order_sets(slab, SETS)
     place = int(np.argmin(np.abs(slab.panels.edges - DEPTH)))
-    rows = [row for edges in sets for row in (edges.up[:, 0] / MU0, edges.down[:, -1] / MU0, edges.fluence[:, place])]
+    rows = [row for up, down, fluence in sets for row in (up[:, 0] / MU0, down[:, -1] / MU0, fluence[:, place])]
     return np.array([[amount, first / amount, math.sqrt(abs(second / amount))] for amount, first, second in rows])
 
 

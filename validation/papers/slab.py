@@ -23,7 +23,7 @@ from realtime.clouds.canonical.transport_grid import Transport, canonical_transp
 from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
 from realtime.numerics.array_types import ArrayTypes, array_types
 from validation.arrays import Array
-from validation.slab.moments import SlabOrders, order_sets
+from validation.slab.moments import DOWN, UP, SlabOrders, order_sets
 from validation.slab.phases import droplet_phase, phase_pair
 
 THICKNESSES = (50.0, 100.0, 300.0, 1000.0)  #: [m]
@@ -83,7 +83,7 @@ def crossing(places: tuple[float, ...], values: list[float], level: float) -> fl
 
 def _reflectance(tau: float, phase: SlabPhase) -> float:
     _, total = order_sets(_slab(tau, 1.0, phase), [(1, math.inf)])
-    return float(total.up[0, 0])
+    return float(total[UP, 0, 0])
 
 
 def _slab(tau: float, mu0: float, phase: SlabPhase) -> SlabOrders:
@@ -93,7 +93,7 @@ def _slab(tau: float, mu0: float, phase: SlabPhase) -> SlabOrders:
 def _fractions(tau: float, sun: float, phase: SlabPhase) -> tuple[float, float]:
     """Return the fraction of orders 1 to 30 in the light that is reflected, and transmitted after scattering [%]."""
     (few, _), total = order_sets(_slab(tau, math.cos(math.radians(sun)), phase), [(1, 30), (31, math.inf)])
-    return 100 * float(few.up[0, 0] / total.up[0, 0]), 100 * float(few.down[0, -1] / total.down[0, -1])
+    return 100 * float(few[UP, 0, 0] / total[UP, 0, 0]), 100 * float(few[DOWN, 0, -1] / total[DOWN, 0, -1])
 
 
 def _by_azimuth(lowered: float, phase: SlabPhase) -> dict[str, float]:

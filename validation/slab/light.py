@@ -32,7 +32,7 @@ from reference.monte_carlo.slab_walk.estimates import SlabEstimate, slab_estimat
 from reference.monte_carlo.slab_walk.walk import Slab
 from validation.arrays import Array, Progress
 from validation.columns import plain
-from validation.slab.moments import SlabOrders, order_sets
+from validation.slab.moments import DOWN, FLUENCE, UP, SlabOrders, order_sets
 from validation.slab.radiance import slab_radiance
 from validation.slab.request import SlabRequest
 
@@ -99,9 +99,9 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
         _order_row(
             name,
             request.depths,
-            _exit(edges.up[:, 0], request.mu0),
-            _exit(edges.down[:, -1], request.mu0),
-            (_exit(edges.fluence[:, place], 1.0) for place in places),
+            _exit(edges[UP, :, 0], request.mu0),
+            _exit(edges[DOWN, :, -1], request.mu0),
+            (_exit(edges[FLUENCE, :, place], 1.0) for place in places),
         )
         for name, edges in zip(request.orders, chosen, strict=True)
     ]
@@ -116,10 +116,10 @@ def _numbers(request: SlabRequest, streams: int, nodes: int) -> dict[str, Any]:
         ]
     direct = math.exp(-request.tau / request.mu0)
     whole = {
-        "reflectance": float(total.up[0, 0]) / request.mu0,
-        "transmittance": float(total.down[0, -1]) / request.mu0 + direct,
+        "reflectance": float(total[UP, 0, 0]) / request.mu0,
+        "transmittance": float(total[DOWN, 0, -1]) / request.mu0 + direct,
         "flux": [
-            {"depth": depth, "up": np.pi * float(total.up[0, place]), "down": np.pi * float(total.down[0, place])}
+            {"depth": depth, "up": np.pi * float(total[UP, 0, place]), "down": np.pi * float(total[DOWN, 0, place])}
             for depth, place in zip(request.depths, places, strict=True)
         ],
         "radiance": radiance,

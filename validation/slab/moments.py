@@ -32,7 +32,6 @@ Bouthors, Neyret, Max, Bruneton, Crassin 2008, "Interactive multiple anisotropic
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,32 +40,12 @@ from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, 
 from realtime.clouds.slab_orders.phases import SlabPhase
 from validation.arrays import Array
 
-
-@dataclass(frozen=True)
-class Edges:
-    """Moments of one order, or of a sum of orders, at the edges of the panels, for unit flux across the beam.
-
-    `up`, `down`, `fluence`: (3, P + 1): flux through the horizontal plane and fluence [1], their first moment in x
-    [mean free paths], and their second moment in x^2 + y^2.
-    """
-
-    up: Array
-    down: Array
-    fluence: Array
-
-    def __add__(self, other: "Edges") -> "Edges":
-        return Edges(self.up + other.up, self.down + other.down, self.fluence + other.fluence)
-
-
-@dataclass(frozen=True)
-class _Fields:
-    """B_0, B_1, A_0, A_1, C_0 of one order at the nodes, (Z, 2 N + 1) each, the beam last."""
-
-    b0: Array
-    b1: Array
-    a0: Array
-    a1: Array
-    c0: Array
+#: Places of the fields of one order at the nodes, (5, Z, 2 N + 1), the beam last.
+B0, B1, A0, A1, C0 = range(5)
+#: Places of the moments of some orders at the edges of the panels, for unit flux across the beam, (3, 3, P + 1): flux
+#: up and down through the horizontal plane, and fluence; of each the amount [1], the first moment in x [mean free
+#: paths], and the second in x^2 + y^2.
+UP, DOWN, FLUENCE = range(3)
 
 
 class SlabOrders:
@@ -108,54 +87,48 @@ class SlabOrders:
         matrix[:-1, -1] = albedo / (4 * np.pi) * mode_kernel(m, moments, mu, np.array([-self.mu0]))[:, 0]
         return matrix + albedo * self.peak * np.eye(mu.size + 1)
 
-    def beam(self) -> "_Fields":
-        """Return order 0: the beam, which has moved z tan theta_0 at depth z."""
+    def beam(self) -> Array:
+        """Return the fields of order 0: the beam, which has moved z tan theta_0 at depth z."""
         depths = self.panels.depths
         shift = depths * (self._sines[-1] / self.mu0)
-        fields = np.zeros((3, depths.size, self.streams.mu.size + 1))
-        flux = np.exp(-depths / self.mu0)
-        fields[:, :, -1] = flux, shift * flux, shift**2 * flux
-        return _Fields(b0=fields[0], b1=fields[0], a0=fields[1], a1=fields[1], c0=fields[2])
+        fields = np.zeros((5, depths.size, self.streams.mu.size + 1))
+        fields[:, :, -1] = np.exp(-depths / self.mu0)
+        fields[[A0, A1], :, -1] *= shift
+        fields[C0, :, -1] *= shift**2
+        return fields
 
-    def following(self, fields: "_Fields") -> tuple["_Fields", Edges]:
-        """Return the next order, and its moments at the edges."""
-        b0, a0, c0 = self._scattered(0, fields.b0, fields.a0, fields.c0)
-        b1, a1 = self._scattered(1, fields.b1, fields.a1)
-        return self._carried(_Fields(b0, b1, a0, a1, c0))
+    def following(self, fields: Array) -> tuple[Array, Array]:
+        """Return the fields of the next order, and its moments at the edges."""
+        sources = np.empty_like(fields)
+        for m, own in enumerate(([B0, A0, C0], [B1, A1])):
+            # In one product, which is faster than one for each.
+            sources[own] = (fields[own].reshape(-1, fields.shape[2]) @ self.scatter[m]).reshape(sources[own].shape)
+        return self._carried(sources)
 
-    def _scattered(self, m: int, *fields: Array) -> Array:
-        """Return the sources of some fields of one mode: in one product, which is faster than one for each."""
-        depths = fields[0].shape[0]
-        return (np.concatenate(fields) @ self.scatter[m]).reshape(len(fields), depths, -1)
+    def _carried(self, sources: Array) -> tuple[Array, Array]:
+        """Return the light of scattered sources, with the displacement it gains on the way, and its moments."""
+        light, lengths = np.empty_like(sources), self._sines
+        light[[B0, B1]], (b0_edges, _) = self._transport(sources[[B0, B1]])
+        light[[A0, A1]], (a0_edges, _) = self._transport(sources[[A0, A1]] + lengths * light[[B1, B0]])
+        light[[C0]], (c0_edges,) = self._transport(sources[[C0]] + 2 * lengths * light[[A1]])
+        return light, self._edges(np.stack([b0_edges, a0_edges, c0_edges]))
 
-    def _carried(self, sources: "_Fields") -> tuple["_Fields", Edges]:
-        """Return the light of scattered sources, with the displacement it gains on the way."""
-        (b0, b1), (b0_edges, _) = self._transport(np.stack([sources.b0, sources.b1]))
-        lengths = self._sines
-        first = np.stack([sources.a0 + lengths * b1, sources.a1 + lengths * b0])
-        (a0, a1), (a0_edges, _) = self._transport(first)
-        (c0,), (c0_edges,) = self._transport((sources.c0 + 2 * lengths * a1)[None])
-        return _Fields(b0, b1, a0, a1, c0), self._edges(np.stack([b0_edges, a0_edges, c0_edges]))
-
-    def _edges(self, values: Array) -> Edges:
+    def _edges(self, values: Array) -> Array:
         """Return fluxes and fluence of (3, P + 1, 2 N + 1) moments."""
         mu, weights = self.streams.mu, self.streams.weights
         diffuse, beam = 2 * np.pi * values[..., :-1] * weights, values[..., -1]
         upward = mu > 0
-        return Edges(
-            up=(diffuse[..., upward] * mu[upward]).sum(-1),
-            down=(diffuse[..., ~upward] * -mu[~upward]).sum(-1) + self.mu0 * beam,
-            fluence=diffuse.sum(-1) + beam,
-        )
+        up = (diffuse[..., upward] * mu[upward]).sum(-1)
+        down = (diffuse[..., ~upward] * -mu[~upward]).sum(-1) + self.mu0 * beam
+        return np.stack([up, down, diffuse.sum(-1) + beam])
 
-    def rest(self, fields: "_Fields") -> Edges:
-        """Return the sum of all orders after that of `fields`."""
+    def rest(self, fields: Array) -> Array:
+        """Return the moments of the sum of all orders after that of `fields`."""
         mean, wave = _AllOrders(self, 0), _AllOrders(self, 1)  # by azimuthal mode
-        b0, b1 = mean(fields.b0), wave(fields.b1)
-        a0, a1 = mean(fields.a0, self._sines * b1), wave(fields.a1, self._sines * b0)
-        c0 = mean(fields.c0, 2 * self._sines * a1)
-        total = _Fields(fields.b0 + b0, fields.b1 + b1, fields.a0 + a0, fields.a1 + a1, fields.c0 + c0)
-        return self.following(total)[1]
+        b0, b1 = mean(fields[B0]), wave(fields[B1])
+        a0, a1 = mean(fields[A0], self._sines * b1), wave(fields[A1], self._sines * b0)
+        c0 = mean(fields[C0], 2 * self._sines * a1)
+        return self.following(fields + np.stack([b0, b1, a0, a1, c0]))[1]
 
 
 class _AllOrders:
@@ -177,28 +150,18 @@ class _AllOrders:
         return np.concatenate([self._modes.all_orders(self._transport, diffuse[None])[0], beam], axis=-1)
 
 
-def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[list[Edges], Edges]:
-    """Return the moments of sets of orders, and of all orders from 1 on.
+def order_sets(slab: SlabOrders, sets: Sequence[tuple[int, float]]) -> tuple[Array, Array]:
+    """Return the moments of sets of orders, (sets, 3, 3, P + 1), and of all orders from 1 on.
 
     `slab`: the slab; `sets`: first and last order of each set, the last one `math.inf` for a set without end.
     """
     finite = [int(last) for _, last in sets if math.isfinite(last)]
     finite += [first - 1 for first, last in sets if not math.isfinite(last)]
-    fields = slab.beam()
-    by_order: list[Edges] = []
+    fields, orders = slab.beam(), []
     for _ in range(max(finite, default=0)):
         fields, edges = slab.following(fields)
-        by_order.append(edges)
-    rest = slab.rest(fields)
-    chosen = []
-    for first, last in sets:
-        members = by_order[first - 1 : int(last) if math.isfinite(last) else None]
-        chosen.append(_sum(members if math.isfinite(last) else [*members, rest]))
-    return chosen, _sum([*by_order, rest])
-
-
-def _sum(members: Sequence[Edges]) -> Edges:
-    total = members[0]
-    for member in members[1:]:
-        total = total + member
-    return total
+        orders.append(edges)
+    orders.append(slab.rest(fields))
+    ends = [int(last) if math.isfinite(last) else len(orders) for _, last in sets]
+    chosen = [sum(orders[first - 1 : end]) for (first, _), end in zip(sets, ends, strict=True)]
+    return np.array(chosen), np.asarray(sum(orders))

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from analytic.droplets import Droplets, Modified, optics
-from analytic.errors import InputError, nearest
-from analytic.phase import PhaseFunction
+from analytic.droplets import Modified
+from analytic.errors import InputError
+from analytic.phase import PhaseFunction, phase_from_words
 from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SlabPhase
 from realtime.droplets import CUT, droplet_series
 from realtime.scene.phase import HgDraine
@@ -23,10 +23,8 @@ from reference.monte_carlo.slab_walk.walk import Scattering
 from validation.arrays import Array
 from validation.readers import read_csv
 
-NAMES = ("isotropic", "hg:G", "hg-draine", "mie", "mie-modified", "FILE.csv")
 #: |g| up to which the streams resolve Henyey and Greenstein's lobe
 LARGEST_G = 0.98
-_DROPLETS = (6.0, 2.0, 0.55)  #: r_e [um], gamma and wavelength [um] of Bouthors 2008
 _TABLE = 20_000  #: rows of the table of droplets
 
 
@@ -42,72 +40,36 @@ class PhasePair:
 def phase_pair(name: str) -> PhasePair:
     """Return a phase function by its name.
 
-    'isotropic', 'hg:G' with the mean cosine G, 'hg-draine:D' with the diameter of droplets D [um], 'mie' (droplets of
-    r_e = 6 um, green), 'mie-modified' (the same without the peak below 5 degrees), or the path of a CSV file.
+    'isotropic', 'hg', 'hg-draine', 'mie' and 'mie-modified', with numbers as of `analytic.phase.phase_from_words`, or
+    the path of a CSV file.
     """
-    if name == "isotropic":
-        return PhasePair(name, HenyeyGreensteinPhase(0.0), lambda: HenyeyGreenstein(0.0))
-    if name.startswith("hg:"):
-        g = _mean_cosine(name)
-        return PhasePair(name, HenyeyGreensteinPhase(g), lambda: HenyeyGreenstein(g))
     if name.lower().endswith(".csv"):
         angles, heights = read_phase_file(Path(name))
         return PhasePair(name, tabulated_phase(angles, heights), lambda: Tabulated(angles, heights))
-    kind, *words = name.split(":")
-    if kind == "hg-draine":
-        return _hg_draine(name, words)
-    if kind in ("mie", "mie-modified"):
-        return _droplets(name, words, modified=kind == "mie-modified")
-    raise InputError(f"phase: got {name!r}, wanted one of {', '.join(NAMES)}{nearest(name, NAMES)}")
+    known = phase_from_words(name)
+    if known.name in ("isotropic", "hg"):
+        if abs(known.g) > LARGEST_G:
+            raise InputError(
+                f"phase: got the mean cosine {known.g:g}, wanted -{LARGEST_G} to {LARGEST_G}, for example hg:0.85"
+            )
+        return PhasePair(name, HenyeyGreensteinPhase(known.g), lambda: HenyeyGreenstein(known.g))
+    if known.diameter is not None:
+        return PhasePair(name, hg_draine_phase(known.diameter), lambda: _table(known))
+    if known.droplets is None:
+        raise InputError(f"phase: got {name!r}, wanted isotropic, hg:G, hg-draine, mie, mie-modified or FILE.csv")
+    numbers = known.droplets.effective_radius, known.droplets.gamma, known.wavelength
+    deterministic = droplet_phase(*numbers, modified=known.name == "mie-modified")
+    return PhasePair(name, deterministic, lambda: _table(known))
 
 
-def _hg_draine(name: str, words: list[str]) -> PhasePair:
-    """Return the fit to droplets; the word is their diameter [um], 12 by default."""
-    diameter = float(words[0]) if words and _is_number(words[0]) else 12.0
-    if len(words) > 1 or not all(map(_is_number, words)) or not 5 <= diameter <= 50:
-        raise InputError(
-            f"phase: got {name!r}, wanted hg-draine:D with a diameter D of 5 to 50 um, for example hg-draine:12"
-        )
-
-    def sampled() -> Scattering:
-        angles = np.concatenate([[0.0], np.geomspace(1e-6, np.pi, _TABLE)])
-        angles[-1] = np.pi
-        function = PhaseFunction("hg-draine", diameter=diameter)
-        return Tabulated(angles, function.from_half(np.sin(angles / 2) ** 2, np.cos(angles / 2) ** 2))
-
-    return PhasePair(name, hg_draine_phase(diameter), sampled)
-
-
-def _droplets(name: str, words: list[str], *, modified: bool) -> PhasePair:
-    """Return droplets: words are r_e [um], gamma and the wavelength [um], as far as they are given."""
-    if len(words) > len(_DROPLETS) or not all(map(_is_number, words)):
-        raise InputError(
-            f"phase: got {name!r}, wanted mie or mie-modified, and if wanted by colons r_e [um], gamma and the "
-            "wavelength [um], for example mie:6:2:0.55"
-        )
-    radius, gamma, wavelength = [*map(float, words), *_DROPLETS[len(words) :]]
-    deterministic = droplet_phase(radius, gamma, wavelength, modified=modified)
-
-    def sampled() -> Scattering:
-        full = optics(Droplets(radius, gamma), wavelength)
-        angles = np.linspace(0.0, np.pi, _TABLE + 1)
-        if not modified:
-            return Tabulated(angles, full(np.cos(angles)))
-        peak = np.deg2rad(Modified(full).angle)
-        angles = np.unique(np.concatenate([angles, [peak * (1 - 1e-12), peak]]))
-        return Tabulated(angles, np.where(angles < peak, 0.0, full(np.cos(angles))))
-
-    return PhasePair(name, deterministic, sampled)
-
-
-def _mean_cosine(name: str) -> float:
-    try:
-        g = float(name.removeprefix("hg:"))
-    except ValueError:
-        raise InputError(f"phase: got {name!r}, wanted hg:G with a mean cosine G, for example hg:0.85") from None
-    if not abs(g) <= LARGEST_G:
-        raise InputError(f"phase: got the mean cosine {g:g}, wanted -{LARGEST_G} to {LARGEST_G}, for example hg:0.85")
-    return g
+def _table(phase: PhaseFunction) -> Tabulated:
+    """Return droplets as a table, by angles that resolve the peak, and the place where one is cut out."""
+    angles, edge = np.linspace(0.0, np.pi, _TABLE + 1), np.deg2rad(Modified.angle)
+    if phase.name == "hg-draine":
+        angles = np.append(np.concatenate([[0.0], np.geomspace(1e-6, np.pi, _TABLE)])[:-1], np.pi)
+    if phase.name == "mie-modified":
+        angles = np.unique(np.concatenate([angles, [edge * (1 - 1e-12), edge]]))
+    return Tabulated(angles, phase.from_half(np.sin(angles / 2) ** 2, np.cos(angles / 2) ** 2))
 
 
 def read_phase_file(path: Path) -> tuple[Array, Array]:

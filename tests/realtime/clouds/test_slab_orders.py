@@ -20,7 +20,7 @@ from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from realtime.clouds.uniform_sky import slab_escapes
 from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
 from reference.monte_carlo.slab_walk.walk import Slab, flights
-from validation.slab.moments import SlabOrders, order_sets
+from validation.slab.moments import FLUENCE, UP, SlabOrders, order_sets
 
 # Photons by directions -----------------------------------------------------------------------------------------------
 
@@ -167,9 +167,9 @@ def test_integrals_over_directions_are_fluence_and_flux_with_their_moments():
     for number, edges in enumerate(expected):
         inside, top = modes[number, 0, :, 1], modes[number, 0, :, 0]
         found = [(inside[field] * weights).sum() for field in (0, 1, 3)]
-        assert found == pytest.approx(list(edges.fluence[:, place]), rel=1e-6)
+        assert found == pytest.approx(list(edges[FLUENCE, :, place]), rel=1e-6)
         upward = weights * np.maximum(rule.mu, 0)
-        assert [(top[field] * upward).sum() for field in (0, 1, 3)] == pytest.approx(list(edges.up[:, 0]), rel=1e-5)
+        assert [(top[field] * upward).sum() for field in (0, 1, 3)] == pytest.approx(list(edges[UP, :, 0]), rel=1e-5)
 
 
 @pytest.mark.claim("clouds-radiance-is-disort", tolerance="1e-4 relative: single precision and 25 modes")

@@ -104,7 +104,7 @@ def test_a_table_of_a_function_is_the_function(tmp_path):
         ({"orders": "0"}, "was never scattered"),
         ({"depths": "0,2.5"}, "wanted depths of 0 to tau"),
         ({"directions": "0:0"}, "not horizontal"),
-        ({"phase": "hg:1"}, "wanted -0.98 to 0.98"),
+        ({"phase": "hg:0.99"}, "wanted -0.98 to 0.98"),
     ],
 )
 def test_what_is_refused(change, words):
