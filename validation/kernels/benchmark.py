@@ -27,7 +27,8 @@ from realtime.scene.phase import named_phase
 from validation.arrays import Counted
 from validation.clock import time_repeated, timing_of
 from validation.kernels.case_files import Cases
-from validation.kernels.cases import TABLE, Kernel, relative_error
+from validation.kernels.cases import TABLE, Kernel
+from validation.kernels.errors import errors_by_group
 from validation.kernels.rays import wide_rays
 from validation.kernels.records import ErrorLevel, KernelCost, RayTime
 from validation.study.configuration import find_kernel, sized, split_name
@@ -86,11 +87,14 @@ def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, se
         device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
     except (InputError, RealtimeInputError) as reason:
         return replace(cost, refused=str(reason))
-    error = relative_error(J, np.asarray(reference.value), "single")
-    finite = np.isfinite(error)
-    median, p99, largest = np.percentile(error[finite], [50, 99, 100]).tolist() if finite.any() else [None] * 3
-    nonfinite = int(np.sum(~finite))
-    return replace(cost, rays=rays, device=device, wall=wall, median=median, p99=p99, max=largest, nonfinite=nonfinite)
+    error = errors_by_group(reference, J, "single", {"all": np.ones(len(J), dtype=bool)})["all"]
+    found: dict[str, Any] = {
+        "median": error.median,
+        "p99": error.p99,
+        "max": error.max,
+        "nonfinite": error.nan + error.infinite,
+    }
+    return replace(cost, rays=rays, device=device, wall=wall, **found)
 
 
 def speed_against_error(costs: Sequence[KernelCost]) -> list[ErrorLevel]:

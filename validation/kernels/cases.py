@@ -4,7 +4,6 @@
 import csv
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import named_phase
 from reference.storage.files import write_text
-from validation.arrays import Array, Bools, Index
+from validation.arrays import Array, Index
 from validation.kernels.case_files import Cases
 from validation.study.configuration import find_kernel
 
@@ -36,27 +35,24 @@ TABLE = (0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 1.0, 2.0, 5.0)
 TINY = {"single": 1e-37, "double": 1e-300}
 
 
-@dataclass(frozen=True)
-class Values:
-    """The values of a kernel for cases: NaN in the rows of phase functions that it refuses."""
+def evaluate_cases(
+    cases: Cases, function: Kernel, precision: str, refused: dict[str, str] | None = None, **options: Any
+) -> Array:
+    """Return J of every case, (cases,) [1/m], as `evaluate_rows` does.
 
-    J: Array  #: (n,) [1/m]
-    refused: dict[str, str]  #: phase function -> the kernel's words
-    accepted: Bools  #: (n,) rows that the kernel did not refuse
-
-
-def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: Any) -> Values:
-    """Return J of every case whose phase function the kernel accepts, as `evaluate_rows` does."""
-    names = np.asarray(cases.phase)
-    results, accepted, refused = np.full(len(names), np.nan), np.ones(len(names), dtype=bool), {}
+    The words with which a kernel refuses a phase function go into `refused`, and J is NaN there; without it they are
+    raised.
+    """
+    names, results = np.asarray(cases.phase), np.full(len(cases.phase), np.nan)
     for name in dict.fromkeys(cases.phase):
         rows = np.flatnonzero(names == name)
         try:
             results[rows] = evaluate_rows(cases, rows, function, precision, **options)
         except (InputError, RealtimeInputError) as reason:
+            if refused is None:
+                raise
             refused[name] = str(reason)
-            accepted[rows] = False
-    return Values(results, refused, accepted)
+    return results
 
 
 def evaluate_rows(
@@ -117,11 +113,7 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
                 f"{_place(cases, row)}: {name} is {values[row]:g}; wanted at most {LARGEST[precision]:g} in "
                 f"{precision} precision: use other units"
             )
-    results = np.empty(len(cases.x0))
-    for name in dict.fromkeys(cases.phase):
-        rows = np.flatnonzero(np.asarray(cases.phase) == name)
-        results[rows] = evaluate_rows(cases, rows, function, precision)
-    return results
+    return evaluate_cases(cases, function, precision)
 
 
 def check_results(cases: Cases, results: Array, kernel: str) -> None:

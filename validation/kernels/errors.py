@@ -29,7 +29,7 @@ The allowance a is in the units of J, and it is small: relative to V it is 1e-38
 [1/m^2] for the terms, so that up to 30 optical depths and r = 1e6 m it is less than a millionth of J.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 
 import numpy as np
@@ -37,7 +37,7 @@ import numpy as np
 from analytic.phase import PhaseFunction, phase_from_words
 from validation.arrays import Array, Bools
 from validation.kernels.case_files import Cases
-from validation.kernels.cases import TABLE, Values, relative_error
+from validation.kernels.cases import TABLE, relative_error
 from validation.kernels.rays import case_row
 from validation.kernels.records import KernelErrors
 
@@ -77,17 +77,22 @@ def _peak(name: str, g: float) -> float:
     return float(np.max(phase(np.array([-1.0, 1.0]))))
 
 
-def errors_by_group(cases: Cases, values: Values, precision: str, rows: Mapping[str, Bools]) -> dict[str, KernelErrors]:
-    """Return the relative errors [1] of each group of rows, against the value of the cases."""
+def errors_by_group(
+    cases: Cases, values: Array, precision: str, rows: Mapping[str, Bools], refused: Collection[str] = ()
+) -> dict[str, KernelErrors]:
+    """Return the relative errors [1] of each group of rows, against the value of the cases.
+
+    `values`: J by a kernel, (cases,) [1/m]; `refused`: the phase functions that it refuses.
+    """
     assert cases.value is not None
-    error = relative_error(values.J, cases.value, precision, underflow_allowance(cases, precision))
-    return {name: _errors(cases, values, error, np.isfinite(cases.value), group) for name, group in rows.items()}
+    error = relative_error(values, cases.value, precision, underflow_allowance(cases, precision))
+    accepted, known = ~np.isin(cases.phase, list(refused)), np.isfinite(cases.value)
+    return {name: _errors(cases, values, error, known, group & accepted, group) for name, group in rows.items()}
 
 
-def _errors(cases: Cases, values: Values, error: Array, known: Bools, group: Bools) -> KernelErrors:
-    tried = group & values.accepted
-    J, finite = values.J[tried], np.isfinite(error) & tried
-    bad = tried & known & ~np.isfinite(values.J)
+def _errors(cases: Cases, values: Array, error: Array, known: Bools, tried: Bools, group: Bools) -> KernelErrors:
+    J, finite = values[tried], np.isfinite(error) & tried
+    bad = tried & known & ~np.isfinite(values)
     median = p99 = largest = mean = worst = None
     if finite.any():
         median, p99, largest = (float(q) for q in np.percentile(error[finite], [50, 99, 100]))
@@ -97,13 +102,13 @@ def _errors(cases: Cases, values: Values, error: Array, known: Bools, group: Boo
         worst = int(np.argmax(bad))
     return KernelErrors(
         rays=int(tried.sum()),
-        refused=int((group & ~values.accepted).sum()),
+        refused=int((group & ~tried).sum()),
         median=median,
         p99=p99,
         max=largest,
         mean=mean,
         nan=int(np.isnan(J).sum()),
-        infinite=int((np.isinf(values.J) & known & tried).sum()),
+        infinite=int((np.isinf(values) & known & tried).sum()),
         negative=int((J < 0).sum()),
         worst=None if worst is None else case_row(cases, worst),
     )

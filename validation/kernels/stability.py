@@ -4,15 +4,15 @@
 The certified values are the files of `validation.certified`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from realtime.kernels.registry import KERNELS
-from validation.arrays import Bools, Counted
+from validation.arrays import Array, Bools, Counted
 from validation.certified.files import certified_data
 from validation.kernels.case_files import Cases, read_cases
-from validation.kernels.cases import Kernel, Values, evaluate_cases
+from validation.kernels.cases import Kernel, evaluate_cases
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays
 from validation.kernels.records import Rays, Stability
@@ -56,13 +56,12 @@ def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases]) -> Sta
     studied = []
     refused: dict[str, str] = {}
     for label, cases in sets.items():
-        values = {precision: evaluate_cases(cases, function, precision) for precision in PRECISIONS}
-        refused |= values["single"].refused
+        values = {each: evaluate_cases(cases, function, each, refused) for each in PRECISIONS}
         rows = groups(cases)
-        errors = {each: errors_by_group(cases, values[each], each, rows) for each in PRECISIONS}
+        errors = {each: errors_by_group(cases, values[each], each, rows, refused) for each in PRECISIONS}
         studied.append(Rays(name=label, columns=",".join(cases.header), **errors))
         if exact:
-            broken += _broken(label, cases, values)
+            broken += _broken(label, cases, values, refused)
     return Stability(kernel=name, exact=exact, refused=refused, sets=tuple(studied), broken=tuple(broken))
 
 
@@ -71,7 +70,7 @@ def claims_exact(name: str) -> bool:
     return name == "exact" or bool(getattr(KERNELS.get(name), "exact", False))
 
 
-def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
+def _broken(name: str, cases: Cases, values: dict[str, Array], refused: Collection[str] = ()) -> list[str]:
     """Return the limits that a kernel that claims to be exact exceeds, in words."""
     sharp, smooth = np.abs(cases.g) > 0.9, np.asarray(cases.phase) != "tabulated"
     rows: dict[str, Bools] = {
@@ -80,7 +79,7 @@ def _broken(name: str, cases: Cases, values: dict[str, Values]) -> list[str]:
         "g up to 0.9": smooth & ~sharp,
         "g above 0.9": sharp,
     }
-    single, double = (errors_by_group(cases, values[precision], precision, rows) for precision in PRECISIONS)
+    single, double = (errors_by_group(cases, values[precision], precision, rows, refused) for precision in PRECISIONS)
     limits = [
         ("float32 maximum, |g| up to 0.9", single["g up to 0.9"], "max", BAR["single_max"]),
         ("float32 maximum, |g| above 0.9", single["g above 0.9"], "max", BAR["single_max_sharp"]),

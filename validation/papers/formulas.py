@@ -31,7 +31,7 @@ from realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
 from validation.arrays import Array, Bools
 from validation.columns import column
 from validation.kernels.case_files import Cases
-from validation.kernels.cases import Kernel, evaluate_cases
+from validation.kernels.cases import Kernel, evaluate_cases, relative_error
 from validation.kernels.rays import wide_rays
 from validation.metrics.errors import known
 
@@ -162,19 +162,11 @@ def printed_against_derived(count: int = 100_000, *, kernels: Mapping[str, Kerne
     for phase in PRINTED_PHASES:
         cases = wide_rays(count, phase)
         regions = {"all": np.ones(count, dtype=bool), "moderate": _moderate(cases), "near-foot": _near_foot(cases)}
-        errors = {name: relative_errors(cases, function) for name, function in kernels.items()}
+        values = {name: evaluate_cases(cases, function, "double") for name, function in kernels.items()}
+        errors = {name: relative_error(J, np.asarray(cases.value), "double") for name, J in values.items()}
         for (region, chosen), (name, error) in product(regions.items(), errors.items()):
             of = error[chosen]
             yield WithinError(phase, region, name, len(of), _within(of, 0.01), _within(of, 0.1))
-
-
-def relative_errors(cases: Cases, function: Kernel) -> Array:
-    """Return |value / J - 1| of every case [1], (n,), in float64; inf where the value is not finite."""
-    assert cases.value is not None
-    values = evaluate_cases(cases, function, "double").J
-    with np.errstate(invalid="ignore", over="ignore"):
-        error = np.abs(values / cases.value - 1)
-    return np.where(np.isfinite(error), error, np.inf)
 
 
 def _moderate(cases: Cases) -> Bools:
@@ -190,4 +182,5 @@ def _near_foot(cases: Cases) -> Bools:
 
 
 def _within(error: Array, bound: float) -> float | None:
+    """Return the fraction within a bound; a value that is not finite has the error NaN, which is not."""
     return float(np.mean(error <= bound)) if len(error) else None

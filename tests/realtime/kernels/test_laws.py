@@ -49,7 +49,7 @@ def precision(request):
 
 
 def J(cases, precision, **options):
-    return evaluate_cases(cases, exact, precision, **options).J
+    return evaluate_cases(cases, exact, precision, **options)
 
 
 def largest_difference(first, second, rows=30):

@@ -16,7 +16,7 @@ from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.kernel_values import take
 from validation.kernels.benchmark import measure, speed_against_error
 from validation.kernels.case_files import read_cases
-from validation.kernels.cases import TABLE, Values, evaluate_cases, integrate_cases, summary, write_results
+from validation.kernels.cases import TABLE, evaluate_cases, integrate_cases, summary, write_results
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, table, wide_rays, with_reference
 from validation.kernels.records import KernelCost, RayTime
@@ -45,8 +45,7 @@ def four_rays():
 
 def test_errors_are_counted_by_group():
     rays = four_rays()
-    values = Values(np.array([1.1, 2.0, -4.0, 8.0]), {}, np.ones(4, dtype=bool))
-    errors = errors_by_group(rays, values, "single", groups(rays))
+    errors = errors_by_group(rays, np.array([1.1, 2.0, -4.0, 8.0]), "single", groups(rays))
     assert list(errors) == ["all", "a", "b", "phase hg", "phase isotropic"]
     assert errors["all"].max == 2.0
     assert errors["all"].negative == 1
@@ -63,11 +62,14 @@ def test_refusal_keeps_the_words_of_the_kernel(variant, error):
             raise error("no lobes here")
         return gauss(geometry, x0, x1, medium, light)
 
-    values = evaluate_cases(four_rays(), refuses, "single")
-    assert values.refused == {"hg": "no lobes here"}
-    assert values.accepted.tolist() == [True, True, True, False]
-    assert np.isnan(values.J[3])
-    assert np.isfinite(values.J[:3]).all()
+    refused = {}
+    values = evaluate_cases(four_rays(), refuses, "single", refused)
+    assert refused == {"hg": "no lobes here"}
+    assert np.isfinite(values).tolist() == [True, True, True, False]
+    errors = errors_by_group(four_rays(), values, "single", groups(four_rays()), refused)
+    assert (errors["all"].rays, errors["all"].refused, errors["phase hg"].rays) == (3, 1, 0)
+    with pytest.raises(error, match="no lobes here"):
+        evaluate_cases(four_rays(), refuses, "single")
 
 
 def test_small_relative_mistake_is_found_where_it_is(variant):
@@ -123,9 +125,9 @@ def test_differences_of_gamma_lose_what_theory_says(variant):
     )
     start = np.zeros(count)
     ends = (replace(thin, x0=start), replace(thin, x0=start, x1=x0))
-    far, near = (evaluate_cases(cases, gauss, "single").J.astype(np.float32) for cases in ends)
+    far, near = (evaluate_cases(cases, gauss, "single").astype(np.float32) for cases in ends)
     off = np.abs((far - near).astype(np.float64) - thin.value)
-    direct = np.abs(evaluate_cases(thin, gauss, "single").J - thin.value)
+    direct = np.abs(evaluate_cases(thin, gauss, "single") - thin.value)
     assert (direct / thin.value).max() < 1e-4
     assert np.median(off / thin.value) > 1e-3
     assert 0.05 < np.median(off / (2.0**-23 * (far.astype(np.float64) + near))) < 5
@@ -149,8 +151,7 @@ def flushed(*given):
 
 def faults(cases, J, precision="single"):
     """Return what values break of the bar, if the other precision is right."""
-    values = {precision: Values(cases.value, {}, np.ones(len(J), dtype=bool)) for precision in ("single", "double")}
-    values[precision] = replace(values[precision], J=np.asarray(J, dtype=np.float64))
+    values = dict.fromkeys(("single", "double"), cases.value) | {precision: np.asarray(J, dtype=np.float64)}
     return _broken(GENERATED, cases, values)
 
 

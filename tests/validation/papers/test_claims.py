@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from realtime.scene.read_scene import read_scene
-from validation.kernels.rays import wide_rays
 from validation.papers import billeter_tables, biri_tables, soft_shafts
 from validation.papers.claims import (
     DIRECTIONS,
@@ -25,7 +24,7 @@ from validation.papers.claims import (
     taken,
     verdict,
 )
-from validation.papers.formulas import _annex, _cloud_equations, _droplets, printed_against_derived, relative_errors
+from validation.papers.formulas import _annex, _cloud_equations, _droplets, printed_against_derived
 from validation.papers.scattering import fitted_constant, left_over
 from validation.papers.shadow_planes import drawn
 from validation.scenes.loading import load_scene
@@ -214,7 +213,6 @@ def test_values_that_are_not_finite_count_as_wrong(variant):
     def broken(geometry, x0, x1, medium, light):
         return 0 * geometry.foot / 0
 
-    assert np.all(np.isinf(relative_errors(wide_rays(16), broken)))
     tried = [each for each in printed_against_derived(64, kernels={"broken": broken}) if each.rays]
     assert len(tried) >= 8
     assert all(each.within_10_percent == 0 for each in tried)
