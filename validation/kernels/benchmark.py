@@ -88,13 +88,8 @@ def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, se
     except (InputError, RealtimeInputError) as reason:
         return replace(cost, refused=str(reason))
     error = errors_by_group(reference, J, "single", {"all": np.ones(len(J), dtype=bool)})["all"]
-    found: dict[str, Any] = {
-        "median": error.median,
-        "p99": error.p99,
-        "max": error.max,
-        "nonfinite": error.nan + error.infinite,
-    }
-    return replace(cost, rays=rays, device=device, wall=wall, **found)
+    cost = replace(cost, median=error.median, p99=error.p99, max=error.max, nonfinite=error.nan + error.infinite)
+    return replace(cost, rays=rays, device=device, wall=wall)
 
 
 def speed_against_error(costs: Sequence[KernelCost]) -> list[ErrorLevel]:

@@ -11,7 +11,6 @@ that face the camera then increment the stencil; in 5.1.5 they decrement it. Any
 does.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import mitsuba as mi
@@ -19,7 +18,7 @@ import numpy as np
 
 from analytic.geometry import foot_and_height
 from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import read_scene
+from realtime.scene.read_scene import Scene, read_scene
 from reference.scene.read import read_reference
 from validation.arrays import Array, Bools
 from validation.estimates.quadrature import reference_image
@@ -36,14 +35,19 @@ _RAYS = 4000  # of the stencil
 
 def orders() -> dict[str, float]:
     """Return the errors without shadows, without an order of the planes, and in the paper's order."""
-    paper = {scene: _error(scene, {"order": "paper"}) for scene in SCENES}
-    unshadowed = error_metrics(_reference("hall"), _rendered("hall", {}, method="unshadowed"))
+    paper, others = [], {}
+    for name in SCENES:
+        scene, true = _opened(name)
+        paper.append(_error(scene, true, order="paper"))
+        if name == "clutter":
+            others["clutter, no order"] = _error(scene, true, order="none")
+        if name == "hall":
+            others["hall, unshadowed"] = _error(scene, true, method="unshadowed")
+            others["hall, paper's order"] = paper[-1]
     return {
-        "hall, unshadowed": known(unshadowed.relative_rmse),
-        "clutter, no order": known(_error("clutter", {"order": "none"}).relative_rmse),
-        "hall, paper's order": known(paper["hall"].relative_rmse),
-        "paper's order, largest": max(known(error.relative_rmse) for error in paper.values()),
-        "paper's order, p99": max(known(error.p99) for error in paper.values()),
+        **{name: known(error.relative_rmse) for name, error in others.items()},
+        "paper's order, largest": max(known(error.relative_rmse) for error in paper),
+        "paper's order, p99": max(known(error.p99) for error in paper),
     }
 
 
@@ -54,14 +58,14 @@ def shortcuts() -> dict[str, float]:
     8-bit buffer in `clutter`, over the pixels whose reference is below white, which is a quarter of the brightest
     airlight of 99 % of the pixels, and four times as much.
     """
-    true = _reference("clutter")
+    scene, true = _opened("clutter")
     brightest = float(np.percentile(true.max(axis=2), 99))
     biases = {}
     for name, white in (("bright", brightest / 4), ("dim", 4 * brightest)):
-        image = _rendered("clutter", {"buffer": "8bit", "white": white})
+        image = _rendered(scene, buffer="8bit", white=white)
         below = true < white
         biases[f"{name}, bias"] = float((image - true)[below].sum() / true[below].sum())
-    vertex = _error("two-pens", {"evaluation": "vertex"})
+    vertex = _error(*_opened("two-pens"), evaluation="vertex")
     return {"near, steps": _steps(), "vertex": known(vertex.relative_rmse), **biases}
 
 
@@ -74,10 +78,7 @@ def _steps() -> float:
     scene = mi.load_dict(_lamp_in_fog(_CLOSE))
     resize(scene, SIZE)
     read = read_scene(scene)
-    true, shown = (
-        render_frame(prepared(read, configuration("unshadowed", kernel))).airlight.astype(np.float64)
-        for kernel in ("exact", "taylor")
-    )
+    true, shown = (_rendered(read, "unshadowed", kernel) for kernel in ("exact", "taylor"))
     white, near = float(np.percentile(true, 99)), _close_to_lamp(scene)
     on_screen = [255 * np.clip(image[near] / white, 0, 1) for image in (true, shown)]
     return float(np.percentile(np.abs(on_screen[1] - on_screen[0]).max(axis=1), 99))
@@ -99,18 +100,19 @@ def _close_to_lamp(scene: Any) -> Bools:
     return (np.arctan2(height, foot) < np.radians(10)).reshape(reference.height, reference.width)
 
 
-def _error(scene: str, values: Mapping[str, Any]) -> Metrics:
-    return error_metrics(_reference(scene), _rendered(scene, values))
+def _opened(name: str) -> tuple[Scene, Array]:
+    """Return a scene, and the airlight of its reference."""
+    loaded = load_scene(name, SIZE).scene
+    return read_scene(loaded), reference_image(loaded).airlight
 
 
-def _reference(scene: str) -> Array:
-    return reference_image(load_scene(scene, SIZE).scene).airlight
-
-
-def _rendered(scene: str, values: Mapping[str, Any], method: str = "shadow-planes") -> Array:
-    read = read_scene(load_scene(scene, SIZE).scene)
-    frame = render_frame(prepared(read, configuration(method, "exact", values)))
+def _rendered(scene: Scene, method: str = "shadow-planes", kernel: str = "exact", **values: Any) -> Array:
+    frame = render_frame(prepared(scene, configuration(method, kernel, values)))
     return np.asarray(frame.airlight, dtype=np.float64)
+
+
+def _error(scene: Scene, true: Array, **how: Any) -> Metrics:
+    return error_metrics(true, _rendered(scene, **how))
 
 
 def stencil() -> dict[str, float]:
