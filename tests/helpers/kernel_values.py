@@ -80,7 +80,7 @@ def take(cases: Cases, rows: NDArray[Any]) -> Cases:
     columns = ("g", "foot", "height", "x0", "x1", "sigma_t", "value", "origin", "direction", "light")
     arrays = {name: getattr(cases, name) for name in columns}
     chosen: dict[str, Any] = {name: None if column is None else column[numbers] for name, column in arrays.items()}
-    for name in ("phase", "tag", "rows"):
+    for name in ("phase", "tag", "rows", "lines"):
         words = getattr(cases, name)
         chosen[name] = tuple(words[k] for k in numbers) if words else words
     return replace(cases, **chosen)

@@ -49,7 +49,12 @@ class Cases:
     direction: Array | None  #: unit vectors, (n, 3), where the file gives rays
     light: Array | None  #: (n, 3) [m], where the file gives rays
     header: tuple[str, ...]  #: names of all columns of the file
-    rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again; none from memory
+    rows: tuple[tuple[str, ...], ...]  #: the text of all columns, to write the table out again; none of generated rays
+    lines: tuple[int, ...] = ()  #: of the rows in their file; none from memory
+
+    def place(self, row: int) -> str:
+        """Return where a row is, in words: its line in the file, or its number."""
+        return f"line {self.lines[row]}" if self.lines else f"row {row}"
 
 
 def read_cases(path: str | Path) -> Cases:
@@ -63,8 +68,7 @@ def read_cases(path: str | Path) -> Cases:
     if not lines:
         raise InputError(f"{path} has {'a header only' if header else 'no lines'}; wanted a header and cases")
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
-    rows = tuple(zip(*columns.values(), strict=True))
-    return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)), rows)
+    return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)))
 
 
 def cases_from_columns(columns: Mapping[str, Any], *, name: str = "cases") -> tuple[Cases, tuple[int, ...]]:
@@ -96,8 +100,8 @@ def cases_from_columns(columns: Mapping[str, Any], *, name: str = "cases") -> tu
     return _checked(_Table(name, flat)), shape
 
 
-def _checked(table: "_Table", rows: tuple[tuple[str, ...], ...] = ()) -> Cases:
-    """Return the cases of a table; `rows` are the text of all columns."""
+def _checked(table: "_Table") -> Cases:
+    """Return the cases of a table."""
     header = tuple(table.columns)
     rays = "t" not in header and any(name in header for name in _RAY)
     table.require("phase", *(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
@@ -134,7 +138,8 @@ def _checked(table: "_Table", rows: tuple[tuple[str, ...], ...] = ()) -> Cases:
         direction,
         light,
         header,
-        rows,
+        tuple(zip(*map(table.cells, header), strict=True)),
+        table.lines,
     )
 
 
@@ -168,7 +173,7 @@ class _Table:
 
     name: str  #: path of the file, or what messages call the columns
     columns: Mapping[str, Any]  #: by name text or numbers, (rows,)
-    lines: tuple[int, ...] | None = None  #: number of each row's line in the file; None for columns from memory
+    lines: tuple[int, ...] = ()  #: number of each row's line in the file; none for columns from memory
 
     @property
     def count(self) -> int:
@@ -181,7 +186,7 @@ class _Table:
         if not missing:
             return
         known = ", ".join(self.columns) or "none"
-        if self.lines is not None:
+        if self.lines:
             raise InputError(
                 f"{self.name}, line 1: no column '{missing[0]}'; the file has {known}: add it, the columns wanted are "
                 f"phase, x0, x1, sigma_t and either t, h or {', '.join(_RAY)}"
@@ -198,7 +203,7 @@ class _Table:
 
     def where(self, row: int, name: str) -> str:
         """Return the words for a message that name the cell of a row in the column `name`."""
-        place = f"row {row}" if self.lines is None else f"line {self.lines[row]}"
+        place = f"line {self.lines[row]}" if self.lines else f"row {row}"
         return f"{self.name}, {place}, column '{name}'"
 
     def numbers(self, name: str, *, infinite: bool = False) -> Array:

@@ -110,7 +110,7 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
         if large.any():
             row = int(np.argmax(large))
             raise InputError(
-                f"{_place(cases, row)}: {name} is {values[row]:g}; wanted at most {LARGEST[precision]:g} in "
+                f"{cases.place(row)}: {name} is {values[row]:g}; wanted at most {LARGEST[precision]:g} in "
                 f"{precision} precision: use other units"
             )
     return evaluate_cases(cases, function, precision)
@@ -125,13 +125,9 @@ def check_results(cases: Cases, results: Array, kernel: str) -> None:
         if cases.height[row] < 1e-30 and cases.x0[row] <= cases.foot[row] <= cases.x1[row]:
             hint = "the light lies on the segment, and J, which grows like 1/height, is infinite: give a larger height"
         raise InputError(
-            f"{_place(cases, row)}: the result is {results[row]:g}, and {int(wrong.sum())} of {len(results)} rows are "
+            f"{cases.place(row)}: the result is {results[row]:g}, and {int(wrong.sum())} of {len(results)} rows are "
             f"not finite; {hint}"
         )
-
-
-def _place(cases: Cases, row: int) -> str:
-    return f"line {row + 2}" if cases.rows else f"row {row}"
 
 
 def summary(cases: Cases, results: Array) -> dict[str, Any]:
@@ -145,8 +141,8 @@ def summary(cases: Cases, results: Array) -> dict[str, Any]:
         return quantiles
     p50, p99, largest = np.percentile(error[finite], [50, 99, 100])
     worst = int(np.flatnonzero(finite)[np.argmax(error[finite])])
-    # Row 1 of the file is its header.
-    return quantiles | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst + 2}
+    worst = cases.lines[worst] if cases.lines else worst
+    return quantiles | {"compared": int(finite.sum()), "p50": p50, "p99": p99, "max": largest, "worst_row": worst}
 
 
 def write_results(cases: Cases, results: Array, target: Path) -> None:

@@ -30,12 +30,16 @@ def test_integrals_of_a_file_and_of_its_columns(data_folder, variant):
     assert not integrals.J.flags.writeable
 
 
-def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant):
+def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant, tmp_path):
     foot, height = np.linspace(-1, 2, 5)[:, None], np.array([0.1, 0.7, 2.0])
     rays = {"phase": "hg", "g": 0.4, "foot": foot, "height": height, "x0": 0.0, "x1": np.inf, "sigma_t": 0.3}
     integrals = airlight.study("integrals", rays, "quadrature-32", precision="double", certify=True)
     assert integrals.J.shape == integrals.value.shape == integrals.error.shape == (5, 3)
     assert np.abs(integrals.error).max() < 1e-4
+    with integrals.save(tmp_path / "results.csv").open() as file:
+        written = list(csv.DictReader(file))
+    np.testing.assert_array_equal([float(row["result"]) for row in written], integrals.J.ravel())
+    np.testing.assert_array_equal([float(row["h"]) for row in written], np.tile(height, 5))
     own = airlight.study("integrals", rays, third, precision="double")
     assert own.kernel.endswith(":third")
     exact = airlight.study("integrals", rays, precision="double")

@@ -191,14 +191,14 @@ def case_file(tmp_path, text):
     return path
 
 
-SHORT = "phase,t,h,x0,x1,sigma_t,value\n" + "isotropic,1,2,0,inf,0.5,1.0\n" * 4
+SHORT = "phase,t,h,x0,x1,sigma_t,value\n# a remark\n" + "isotropic,1,2,0,inf,0.5,1.0\n" * 4
 
 
 def test_summary_finds_the_worst_row_of_the_file(tmp_path):
     cases = read_cases(case_file(tmp_path, SHORT))
     counts = summary(cases, np.array([1.0, 1.1, 0.7, 1.2]))
-    # Line 1 of the file is its header, so the third case is in line 4.
-    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (4, 4, 0, 4)
+    # After the header and the remark the third case is in line 5.
+    assert (counts["rows"], counts["compared"], counts["nonfinite"], counts["worst_row"]) == (4, 4, 0, 5)
     assert counts["max"] == pytest.approx(0.3)
     assert counts["p50"] == pytest.approx(0.15)
 
