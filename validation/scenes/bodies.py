@@ -5,8 +5,8 @@ A mesh bounds a body if every edge is met by two triangles, once each way, no tr
 around every point its triangles wind once (inside) or not at all (outside). Methods and reference count on that.
 """
 
-from collections.abc import Sequence
-from itertools import combinations, product
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import drjit as dr
@@ -24,7 +24,6 @@ from realtime.scene.closed_mesh import (
     Bounds,
     ClosedMesh,
     encloses,
-    holds,
     read_bounds,
     shape_number,
     winding_number,
@@ -32,6 +31,7 @@ from realtime.scene.closed_mesh import (
 from realtime.scene.mesh_adjacency import scene_of
 from validation.arrays import Array, Index
 
+Body = tuple[Bounds | None, ClosedMesh | None]  #: as `read_bounds` returns it
 _SIDE = 1e-6  # of the length of an edge, and of the weights of a corner: what lies nearer to an end only touches it
 
 
@@ -46,21 +46,16 @@ def check_bodies(scene: Any) -> None:
         read = [read_bounds(shape) for shape in shapes]
     except MeshError as error:
         raise InputError(str(error)) from None
-    convex = [bounds for bounds, _ in read if bounds is not None]
-    if len(convex) == len(read):
-        shared: list[tuple[Any, Any]] = [pair for pair in combinations(convex, 2) if overlap(*pair)]
-    else:
-        meshes, balls = [mesh for _, mesh in read if mesh], [bounds for bounds in convex if bounds.is_sphere]
-        _check_crossings([mesh for _, mesh in read], shapes)
-        _check_nesting(meshes)
-        shared = [pair for pair in combinations(balls, 2) if overlap(*pair)]
-        pairs = product(meshes, balls)
-        shared += [(a, b) for a, b in pairs if encloses(a, b.centre) or holds(b, a.vertices[0])]
-    for first, second in shared:
-        raise InputError(
-            f"the media of shapes '{first.name}' and '{second.name}' overlap or one holds the other; wanted disjoint "
-            "bounds"
-        )
+    if any(bounds is None for bounds, _ in read):
+        meshes = {shape_number(shape): mesh for shape, (_, mesh) in zip(shapes, read) if mesh is not None}
+        _check_crossings(meshes, scene_of([shape for shape, (_, mesh) in zip(shapes, read) if mesh is not None]))
+        _check_nesting(list(meshes.values()))
+    for first, second in combinations(range(len(read)), 2):
+        if _overlap(read[first], read[second]):
+            raise InputError(
+                f"the media of shapes '{shapes[first].id()}' and '{shapes[second].id()}' overlap or one holds the "
+                "other; wanted disjoint bounds"
+            )
 
 
 def _bounds_medium(shape: Any) -> bool:
@@ -68,41 +63,49 @@ def _bounds_medium(shape: Any) -> bool:
     return null and not shape.is_emitter() and shape.interior_medium() is not None
 
 
-def overlap(first: Bounds, second: Bounds) -> bool:
-    """Return whether two bounds share more than 1e-5 of their size; bounds that touch do not."""
-    gap = float(np.linalg.norm(first.centre - second.centre))
-    margin = FLAT * min(first.radius, second.radius)
-    if gap >= first.radius + second.radius - margin:
+def _overlap(first: Body, second: Body) -> bool:
+    """Return whether two bodies share more than 1e-5 of their size; bodies that touch do not.
+
+    Two meshes that are not both convex are for `_check_crossings` and `_check_nesting`.
+    """
+    (one, one_mesh), (other, other_mesh) = first, second
+    if one is not None and other is not None:
+        gap = float(np.linalg.norm(one.centre - other.centre))
+        margin = FLAT * min(one.radius, other.radius)
+        if gap >= one.radius + other.radius - margin:
+            return False
+        if one_mesh is None and other_mesh is None:
+            return True
+        if one_mesh is not None and other_mesh is not None:
+            return _common_sphere(one, other) > margin
+    sphere, mesh = (one, other_mesh) if one_mesh is None else (other, one_mesh)
+    if sphere is None or mesh is None or not sphere.is_sphere:
         return False
-    if first.is_sphere and second.is_sphere:
-        return True
-    if first.is_sphere or second.is_sphere:
-        sphere, mesh = (first, second) if first.is_sphere else (second, first)
-        return _distance_to_hull(mesh, sphere.centre) < sphere.radius - margin
-    # The largest sphere in both: maximise t under n . x + t <= offset.
+    return encloses(mesh, sphere.centre) or _distance(mesh, sphere.centre) < sphere.radius * (1 - FLAT)
+
+
+def _common_sphere(first: Bounds, second: Bounds) -> float:
+    """Return the radius of the largest sphere in two convex meshes: the largest t under n . x + t <= offset."""
     planes = np.concatenate([first.normals, second.normals])
-    largest_sphere = scipy.optimize.linprog(
+    largest = scipy.optimize.linprog(
         [0, 0, 0, -1],
         A_ub=np.column_stack([planes, np.ones(len(planes))]),
         b_ub=np.concatenate([first.offsets, second.offsets]),
         bounds=[(None, None)] * 4,
     )
-    return bool(largest_sphere.status == 0 and -largest_sphere.fun > margin)
+    return -float(largest.fun) if largest.status == 0 else 0.0
 
 
-def _distance_to_hull(bounds: Bounds, point: Array) -> float:
-    """Return the distance from a point to the convex hull of the corners.
-
-    min |sum_i l_i v_i - point| with l_i >= 0 and sum l_i = 1 is a problem of non-negative least squares; a heavy last
-    row holds the sum.
-    """
-    if holds(bounds, point):
-        return 0.0
-    weight = 1e4 * bounds.radius
-    corners = np.unique(bounds.corners.reshape(-1, 3), axis=0) - point
-    matrix = np.vstack([corners.T, np.full(len(corners), weight)])
-    fractions, _ = scipy.optimize.nnls(matrix, np.array([0.0, 0.0, 0.0, weight]))
-    return float(np.linalg.norm(fractions @ corners / fractions.sum()))
+def _distance(mesh: ClosedMesh, point: Array) -> float:
+    """Return the distance from a point to the triangles of a mesh: to their planes, or to their sides."""
+    corners = mesh.corners - point
+    sides = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    beside = np.einsum("tsx,tx->ts", np.cross(sides, -corners), normals)  # how far inwards of a side the foot lies
+    planes = np.abs(np.einsum("tx,tx->t", corners[:, 0], normals))[np.all(beside > 0, axis=1)]
+    along = np.clip(-np.sum(corners * sides, axis=2) / np.sum(sides**2, axis=2), 0, 1)
+    return float(min(planes.min(initial=np.inf), np.linalg.norm(corners + along[..., None] * sides, axis=2).min()))
 
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
@@ -149,26 +152,19 @@ def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
     return parts
 
 
-def _check_crossings(meshes: Sequence[ClosedMesh | None], shapes: Sequence[Any]) -> None:
-    """Refuse meshes of which an edge passes through a triangle that it does not touch, or through a sphere.
+def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
+    """Refuse meshes of which an edge passes through a triangle that it does not touch.
 
-    `meshes`: those of the shapes, None for a sphere. Mitsuba finds the triangles, in float32; the crossing is computed
-    again in float64.
+    `meshes`: by the numbers of their shapes, those of the Mitsuba scene `boundary`. Mitsuba finds the triangles, in
+    float32; the crossing is computed again in float64.
     """
-    boundary = scene_of(shapes)
-    numbers = {shape_number(shape): number for number, shape in enumerate(shapes)}
-    for number, mesh in enumerate(meshes):
-        if mesh is None:
-            continue
+    for mesh in meshes.values():
         tail, head = _edges(mesh)
         begin, end = mesh.vertices[tail], mesh.vertices[head]
         met, triangle, edge = _met_triangles(boundary, begin, end)
-        other = np.array([numbers[each] for each in met.tolist()], dtype=np.int64)
-        for second in np.unique(other):
-            pairs = np.flatnonzero(other == second)
-            against, at = meshes[second], np.ones(len(pairs), dtype=bool)
-            if against is not None:
-                at = _piercing(against.corners[triangle[pairs]], begin[edge[pairs]], end[edge[pairs]])
+        for number in np.unique(met).tolist():
+            against, pairs = meshes[number], np.flatnonzero(met == number)
+            at = _piercing(against.corners[triangle[pairs]], begin[edge[pairs]], end[edge[pairs]])
             if against is mesh:
                 shared = mesh.faces[triangle[pairs]][:, :, None] == np.stack([tail, head], 1)[edge[pairs]][:, None]
                 at &= ~shared.any(axis=(1, 2))
@@ -176,13 +172,13 @@ def _check_crossings(meshes: Sequence[ClosedMesh | None], shapes: Sequence[Any])
                 continue
             first = pairs[int(np.argmax(at))]
             words = mesh.edge_words(tail[edge[first]], head[edge[first]])
-            if second == number:
+            if against is mesh:
                 raise InputError(
                     f"shape '{mesh.name}' bounds a medium and crosses itself: {words} passes through triangle "
                     f"{triangle[first]}; wanted a mesh without crossings"
                 )
             raise InputError(
-                f"the media of shapes '{mesh.name}' and '{shapes[second].id()}' overlap: {words} of the first passes "
+                f"the media of shapes '{mesh.name}' and '{against.name}' overlap: {words} of the first passes "
                 f"through triangle {triangle[first]} of the other; wanted disjoint bounds"
             )
 

@@ -15,6 +15,10 @@ pytestmark = pytest.mark.usefixtures("variant")
 FAR = (400.3, 20.1, -30.7)
 WITHIN = np.array([3.71, -0.13, 2.03]) + 101.37 * TURN[:, 0]  # in the middle of the tube of the ring
 
+CORNERS = ring()[0][ring()[1][5]]  # of a facet, through which a small sphere dips without an edge
+BESIDE, FACET_NORMAL = CORNERS.mean(axis=0), np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0])
+FACET_NORMAL /= np.linalg.norm(FACET_NORMAL)
+
 
 def flipped(mesh):
     return mesh[0], mesh[1][:, ::-1]
@@ -71,9 +75,11 @@ def test_a_hollow_cloud_and_a_cloud_in_its_hollow_are_taken():
         (FAR, 30.0, None),
         (WITHIN, 3.0, "one holds the other"),
         (WITHIN, 400.0, "one holds the other"),
-        (WITHIN, 60.0, "'ring' and 'ball' overlap: edge"),
+        (WITHIN, 60.0, "'ring' and 'ball' overlap"),
+        (BESIDE + 1.01 * FACET_NORMAL, 1.0, None),
+        (BESIDE + 0.99 * FACET_NORMAL, 1.0, "'ring' and 'ball' overlap"),
     ],
-    ids=["apart", "within", "around", "across"],
+    ids=["apart", "within", "around", "across", "beside-a-facet", "in-a-facet"],
 )
 def test_spheres_beside_meshes_that_are_not_convex(middle, radius, message):
     scene = loaded(sun=SUN, ring=cloud("ring", ring()), ball=ball("ball", middle, radius))
