@@ -116,14 +116,6 @@ def peak_memory(work: Callable[[], Any]) -> float | None:
     return (_status("VmHWM") - before) / _MIB
 
 
-def largest_memory() -> float | None:
-    """Return the most memory that the process has held so far [MiB]; None where the system does not say."""
-    try:
-        return _status("VmHWM") / _MIB
-    except OSError:
-        return None
-
-
 def _status(key: str) -> int:
     """Return a size that Linux knows of this process [KiB]."""
     lines = Path("/proc/self/status").read_text().splitlines()

@@ -68,7 +68,6 @@ class Cost:
     compiled: int | None = column("compiled", "1", "of these, how many LLVM or CUDA compiled", default=None)
     bytes: int | None = column("device memory", "bytes", "at the peak of preparation and frame", default=None)
     lights: int | None = column("lights", "1", "that the method renders, light samples among them", default=None)
-    peak_mib: float | None = column("process", "MiB", "largest resident memory of the process until then", default=None)
     work_ms: float | None = column("work", "ms", "that the cell took from its beginning to its row", default=None)
     cpu_ms: float | None = column("processor", "ms", "processor time of that, of all threads", default=None)
     alone: bool | None = column("alone", "", "whether nothing else of the study ran beside timed frames", default=None)

@@ -26,7 +26,7 @@ from realtime.methods.registry import find_method
 from realtime.methods.shader.source import is_shader
 from realtime.scene.read_scene import Scene, read_scene
 from reference.storage.exr import Image
-from validation.clock import largest_memory, peak_memory, stopwatch, time_repeated, timed
+from validation.clock import peak_memory, stopwatch, time_repeated, timed
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
@@ -100,7 +100,7 @@ def run(
         row = replace(row, picture=paint(known, shown))
     assert row.cost is not None
     lights, (work_ms, cpu_ms) = rendered_lights(scene, cell.chosen), took()
-    cost = replace(row.cost, lights=lights, peak_mib=largest_memory(), work_ms=work_ms, cpu_ms=cpu_ms)
+    cost = replace(row.cost, lights=lights, work_ms=work_ms, cpu_ms=cpu_ms)
     return replace(row, cost=cost), frame
 
 
