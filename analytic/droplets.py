@@ -93,12 +93,12 @@ class Droplets:
         low, high = _RADII
         if not low <= self.effective_radius <= high:
             raise InputError(
-                f"the effective radius is {self.effective_radius} um; wanted {low:g} to {high:g} um, the droplets of "
+                f"the effective radius is {self.effective_radius} um; expected {low:g} to {high:g} um, the droplets of "
                 "fog and clouds"
             )
         for name in ("gamma", "number"):
             if not 0 < getattr(self, name) < np.inf:
-                raise InputError(f"{name} of the droplets is {getattr(self, name)}; wanted a number above 0")
+                raise InputError(f"{name} of the droplets is {getattr(self, name)}; expected a number above 0")
 
     @property
     def scale(self) -> float:
@@ -199,7 +199,7 @@ def optics(droplets: Droplets | None = None, wavelength: float = 0.55, *, sizes:
     """
     kinds = droplets or Droplets()
     if wavelength not in WATER:
-        raise InputError(f"the wavelength is {wavelength} um; wanted {', '.join(f'{each:g}' for each in WATER)} um")
+        raise InputError(f"the wavelength is {wavelength} um; expected {', '.join(f'{each:g}' for each in WATER)} um")
     m = complex(WATER[wavelength])
     radius, weight = kinds.nodes(sizes or kinds.sizes)
     x = 2 * np.pi * radius / wavelength

@@ -14,7 +14,7 @@ Value = TypeVar("Value")
 class InputError(ValueError):
     """An input that cannot be used: the user repairs it, and it is not a fault of the program.
 
-    The message is one line that says what was given, what is wanted and what to do. The command line prints it
+    The message is one line that says what was given, what is expected and what to do. The command line prints it
     without a traceback and exits with status 2.
     """
 
@@ -40,8 +40,8 @@ def named_values(option: str, words: Iterable[str], read: Callable[[str], Value]
                 raise ValueError(word)
             value = read(text)
         except ValueError:
-            raise InputError(f"{option}: got {word!r}, wanted {wanted}") from None
+            raise InputError(f"{option}: got {word!r}, expected {wanted}") from None
         if values.setdefault(name, value) != value:
             first = next(each.strip() for each in words if each.partition("=")[0].strip() == name)
-            raise InputError(f"{option}: got {first} and {word.strip()}, wanted one of them: each name once")
+            raise InputError(f"{option}: got {first} and {word.strip()}, expected one of them: each name once")
     return values

@@ -42,12 +42,12 @@ def foot_and_height(origin: ArrayLike, direction: ArrayLike, light: ArrayLike) -
     length = np.sqrt(np.sum(d * d, axis=-1))
     if np.any(np.abs(length - 1) > 1e-5):
         worst = float(length.flat[np.argmax(np.abs(length - 1))])
-        raise InputError(f"a direction has length {worst:.6g}; wanted length 1: divide it by its length")
+        raise InputError(f"a direction has length {worst:.6g}; expected length 1: divide it by its length")
     try:
         v, d, length = np.broadcast_arrays(p - o, d, length[..., None])
     except ValueError:
         raise InputError(
-            f"origin, direction and light have the shapes {o.shape}, {d.shape}, {p.shape}; wanted (n, 3) or (3,) each"
+            f"origin, direction and light have the shapes {o.shape}, {d.shape}, {p.shape}; expected (n, 3) or (3,) each"
         ) from None
     v, d, length = np.atleast_2d(v), np.atleast_2d(d), np.atleast_2d(length)[:, 0]
     foot = np.sum(v * d, axis=1) / length
@@ -59,9 +59,9 @@ def foot_and_height(origin: ArrayLike, direction: ArrayLike, light: ArrayLike) -
 def _points(name: str, value: ArrayLike) -> Array:
     points = np.asarray(value, dtype=np.float64)
     if points.ndim not in (1, 2) or points.shape[-1] != 3:
-        raise InputError(f"{name} has the shape {points.shape}; wanted (n, 3) or (3,)")
+        raise InputError(f"{name} has the shape {points.shape}; expected (n, 3) or (3,)")
     if not np.all(np.isfinite(points)):
-        raise InputError(f"{name} holds a number that is not finite; wanted finite coordinates")
+        raise InputError(f"{name} holds a number that is not finite; expected finite coordinates")
     return points
 
 

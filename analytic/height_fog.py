@@ -95,13 +95,19 @@ class HeightFog:
     def __post_init__(self):
         for layer in self.layers:
             if not (np.isfinite(layer.sigma_t) and layer.sigma_t >= 0 and np.isfinite(layer.base)):
-                raise InputError(f"height fog: a layer has {layer}; wanted finite numbers, an extinction of 0 or more")
+                raise InputError(
+                    f"height fog: a layer has {layer}; expected finite numbers, an extinction of 0 or more"
+                )
             if not 0 < layer.scale_height < np.inf:
-                raise InputError(f"height fog: a layer has the scale height {layer.scale_height}; wanted one above 0 m")
+                raise InputError(
+                    f"height fog: a layer has the scale height {layer.scale_height}; expected one above 0 m"
+                )
         if not 0 <= self.constant < np.inf:
-            raise InputError(f"height fog: its constant part is {self.constant}; wanted an extinction of 0 or more")
+            raise InputError(f"height fog: its constant part is {self.constant}; expected an extinction of 0 or more")
         if not self.floor < self.cap:
-            raise InputError(f"height fog: its cap is at {self.cap} m and its floor at {self.floor} m; wanted it above")
+            raise InputError(
+                f"height fog: its cap is at {self.cap} m and its floor at {self.floor} m; expected it above"
+            )
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -234,12 +240,12 @@ def height_fog_sun(
     if not -1 <= sun <= 1 or sun == 0 or (sun < 0 and np.isinf(fog.floor)):
         raise InputError(
             f"the sun's direction has the vertical component {sun:g}: at or below the horizon each of its light paths "
-            "through fog without a floor is infinitely deep; wanted a sun above the horizon"
+            "through fog without a floor is infinitely deep; expected a sun above the horizon"
         )
     if fog.constant > 0 and sun > 0 and np.isinf(fog.cap):
         raise InputError(
-            "height fog with a constant part has no cap: each light path of the sun is infinitely deep; wanted a cap, "
-            "or no constant part"
+            "height fog with a constant part has no cap: each light path of the sun is infinitely deep; expected a "
+            "cap, or no constant part"
         )
     origin, rise, x0, x1, p = np.broadcast_arrays(
         *(np.asarray(v, dtype=np.float64) for v in (origin, rise, x0, x1, phase))

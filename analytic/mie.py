@@ -158,11 +158,11 @@ def checked(size: ArrayLike, index: complex) -> tuple[Array, complex]:
     """
     x = np.atleast_1d(np.asarray(size, dtype=np.float64))
     if not x.size or not np.all((x >= 1e-6) & (x <= _LARGEST)):
-        raise InputError(f"the size 2 pi r/wavelength is {size!r}; wanted numbers from 1e-6 to {_LARGEST:g}")
+        raise InputError(f"the size 2 pi r/wavelength is {size!r}; expected numbers from 1e-6 to {_LARGEST:g}")
     m = complex(index)
     if not (math.isfinite(m.real) and math.isfinite(m.imag) and m.real > 0 and m.imag >= 0) or m == 1:
         raise InputError(
-            f"the refractive index is {index}; wanted n + ik with n > 0 and k >= 0, not 1 (absorption is positive k)"
+            f"the refractive index is {index}; expected n + ik with n > 0 and k >= 0, not 1 (absorption is positive k)"
         )
     return x, m
 

@@ -101,9 +101,9 @@ def airlight_segments(
     """
     columns = _checked(foot, height, x0, x1, sigma_t)
     if not 0 <= shadow_scale <= 1:
-        raise InputError(f"shadow_scale is {shadow_scale}; wanted a number from 0 to 1 (1 is the physical value)")
+        raise InputError(f"shadow_scale is {shadow_scale}; expected a number from 0 to 1 (1 is the physical value)")
     if not 1e-13 <= rtol <= 0.1:
-        raise InputError(f"rtol is {rtol}; wanted a relative tolerance from 1e-13 to 0.1")
+        raise InputError(f"rtol is {rtol}; expected a relative tolerance from 1e-13 to 0.1")
     integrand = _Integrand(phase, float(shadow_scale), weight)
     n = len(columns[0])
     value, error = np.zeros(n), np.zeros(n)
@@ -327,7 +327,9 @@ def _checked(foot: ArrayLike, height: ArrayLike, x0: ArrayLike, x1: ArrayLike, s
     except (TypeError, ValueError) as reason:
         raise InputError(f"foot, height, x0, x1 and sigma_t do not fit together: {reason}") from None
     if columns[0].ndim != 1:
-        raise InputError(f"foot, height, x0, x1 and sigma_t have the shape {columns[0].shape}; wanted one column each")
+        raise InputError(
+            f"foot, height, x0, x1 and sigma_t have the shape {columns[0].shape}; expected one column each"
+        )
     for name, column in zip(names, columns):
         fine = np.isfinite(column) if name != "x1" else ~np.isnan(column)
         if name in ("height", "sigma_t"):
@@ -337,5 +339,5 @@ def _checked(foot: ArrayLike, height: ArrayLike, x0: ArrayLike, x1: ArrayLike, s
         if not fine.all():
             row = int(np.argmin(fine))
             wanted = {"height": "a number >= 0", "sigma_t": "a number >= 0", "x1": "a number >= x0, or inf"}
-            raise InputError(f"{name} of row {row} is {column[row]}; wanted {wanted.get(name, 'a finite number')}")
+            raise InputError(f"{name} of row {row} is {column[row]}; expected {wanted.get(name, 'a finite number')}")
     return tuple(columns)

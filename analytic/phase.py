@@ -91,7 +91,7 @@ class PhaseFunction:
         if self.name not in (*PHASE_NAMES, *DROPLET_NAMES):
             raise InputError(unknown_phase(self.name))
         if not isinstance(self.g, (int, float, np.floating)) or not -1 < self.g < 1:
-            raise InputError(f"g is {self.g}; wanted a number between -1 and 1, both excluded: give the mean cosine")
+            raise InputError(f"g is {self.g}; expected a number between -1 and 1, both excluded: give the mean cosine")
         if self.g != 0 and self.name != "hg":
             raise InputError(f"g is {self.g} for the phase function '{self.name}', which has none; use 'hg' or drop g")
         if (self.table is not None) != (self.name == "tabulated"):
@@ -114,13 +114,13 @@ class PhaseFunction:
         if self.name in _DROPLETS:
             if self.wavelength not in WATER:
                 known = ", ".join(f"{each:g}" for each in WATER)
-                raise InputError(f"the wavelength of '{self.name}' is {self.wavelength} um; wanted one of {known} um")
+                raise InputError(f"the wavelength of '{self.name}' is {self.wavelength} um; expected one of {known} um")
             object.__setattr__(self, "droplets", self.droplets or Droplets())
         if self.name == "hg-draine":
             diameter = 12.0 if self.diameter is None else self.diameter
             if not 5 <= diameter <= 50:
                 raise InputError(
-                    f"the diameter of 'hg-draine' is {diameter} um; wanted 5 to 50 um, where the fit holds"
+                    f"the diameter of 'hg-draine' is {diameter} um; expected 5 to 50 um, where the fit holds"
                 )
             object.__setattr__(self, "diameter", diameter)
 
@@ -292,11 +292,15 @@ def phase_from_words(words: str, *, g: float = 0.0) -> PhaseFunction:
     if name not in (*PHASE_NAMES, *DROPLET_NAMES):
         raise InputError(unknown_phase(name))
     if len(cells) > most.get(name, 0):
-        raise InputError(f"the phase function is '{words}'; wanted at most {most.get(name, 0)} numbers after '{name}'")
+        raise InputError(
+            f"the phase function is '{words}'; expected at most {most.get(name, 0)} numbers after '{name}'"
+        )
     try:
         numbers = [float(cell) for cell in cells]
     except ValueError:
-        raise InputError(f"the phase function is '{words}'; wanted numbers after '{name}', parted by colons") from None
+        raise InputError(
+            f"the phase function is '{words}'; expected numbers after '{name}', parted by colons"
+        ) from None
     if name == "hg":
         return PhaseFunction(name, g=numbers[0] if numbers else g)
     if name == "hg-draine":
@@ -342,12 +346,12 @@ def _checked_table(table: Sequence[float]) -> tuple[float, ...]:
     try:
         values = tuple(float(v) for v in table)
     except (TypeError, ValueError):
-        raise InputError(f"the table of a phase function is {table!r}; wanted a list of numbers") from None
+        raise InputError(f"the table of a phase function is {table!r}; expected a list of numbers") from None
     if len(values) < 2:
-        raise InputError(f"the table of a phase function has {len(values)} value; wanted at least 2, from -1 to +1")
+        raise InputError(f"the table of a phase function has {len(values)} value; expected at least 2, from -1 to +1")
     for index, value in enumerate(values):
         if not (math.isfinite(value) and value >= 0):
-            raise InputError(f"value {index} of the phase function's table is {value}; wanted finite values >= 0")
+            raise InputError(f"value {index} of the phase function's table is {value}; expected finite values >= 0")
     if _table_mean(np.asarray(values)) <= 0:
-        raise InputError("all values of the phase function's table are 0; wanted at least one above 0")
+        raise InputError("all values of the phase function's table are 0; expected at least one above 0")
     return values

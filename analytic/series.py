@@ -36,9 +36,9 @@ def taylor_coefficients(a: ArrayLike, phase: PhaseFunction, degree: int = 4) -> 
     """
     thickness = np.asarray(a, dtype=np.float64)
     if degree < 0:
-        raise InputError(f"degree is {degree}; wanted a number >= 0")
+        raise InputError(f"degree is {degree}; expected a number >= 0")
     if not np.all(np.isfinite(thickness) & (thickness >= 0)):
-        raise InputError("a holds a number that is negative or not finite; wanted optical thicknesses >= 0")
+        raise InputError("a holds a number that is negative or not finite; expected optical thicknesses >= 0")
     exponential = _exponential_series(thickness, degree)
     lobe = phase.series(degree)
     if lobe is None:

@@ -131,11 +131,11 @@ def droplet_series(radius: float = 6.0, gamma: float = 2.0, wavelength: float = 
 
 def _check(radius: float, gamma: float, wavelength: float) -> None:
     if not 2 <= radius <= 50:
-        raise InputError(f"the effective radius of the droplets is {radius} um; wanted 2 to 50 um")
+        raise InputError(f"the effective radius of the droplets is {radius} um; expected 2 to 50 um")
     if not 0 < gamma < np.inf:
-        raise InputError(f"gamma of the droplets is {gamma}; wanted a number above 0")
+        raise InputError(f"gamma of the droplets is {gamma}; expected a number above 0")
     if wavelength not in _WATER:
-        raise InputError(f"the wavelength is {wavelength} um; wanted one of {', '.join(map(str, _WATER))} um")
+        raise InputError(f"the wavelength is {wavelength} um; expected one of {', '.join(map(str, _WATER))} um")
 
 
 def _grouped(count: int) -> list[NDArray[np.int64]]:

@@ -7,7 +7,7 @@
 
 
 class InputError(ValueError):
-    """Input that cannot be used. The message says in one line what was given, what is wanted and what to do."""
+    """Input that cannot be used. The message says in one line what was given, what is expected and what to do."""
 
 
 class NoDriverError(RuntimeError):

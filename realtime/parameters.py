@@ -12,7 +12,7 @@ words, checks, their messages, `airlight list methods` and the tables of the doc
 Steps(steps=24)
 >>> Steps(steps=0)
 Traceback (most recent call last):
-realtime.errors.InputError: steps: got 0, wanted a whole number of at least 1
+realtime.errors.InputError: steps: got 0, expected a whole number of at least 1
 """
 
 import difflib
@@ -98,7 +98,7 @@ def read_parameters(
             names = [*known, *others]
             wanted = ", ".join(names) or "none"
             raise InputError(
-                f"method {method}: got a parameter {name!r}, wanted one of: {wanted}{nearest(name, names)}"
+                f"method {method}: got a parameter {name!r}, expected one of: {wanted}{nearest(name, names)}"
             )
         converted[name] = _converted(f"method {method}: {name}", value, known[name])
     return kind(**converted)
@@ -139,7 +139,7 @@ def _check_value(item: Field, value: Any) -> None:
         limits.check(value)
     elif not _allowed(limits, item.default, value):
         hint = nearest(value, limits.choices) if limits.choices and isinstance(value, str) else ""
-        raise InputError(f"{item.name}: got {value!r}, wanted {wanted_values(item)}{hint}")
+        raise InputError(f"{item.name}: got {value!r}, expected {wanted_values(item)}{hint}")
 
 
 def _allowed(limits: Limits, default: Any, value: Any) -> bool:
@@ -170,13 +170,13 @@ def _converted(what: str, value: Any, default: Any) -> int | float | str:
     if isinstance(default, bool):
         word = str(value).strip().lower()
         if word not in _TRUE + _FALSE:
-            raise InputError(f"{what} got {value!r}, wanted true or false")
+            raise InputError(f"{what} got {value!r}, expected true or false")
         return word in _TRUE
     if isinstance(default, float):
         try:
             return float(value)
         except (TypeError, ValueError):
-            raise InputError(f"{what} got {value!r}, wanted a number") from None
+            raise InputError(f"{what} got {value!r}, expected a number") from None
     if isinstance(default, int):
         try:
             # int() would cut off what stands behind the point, and take True for 1.
@@ -184,5 +184,5 @@ def _converted(what: str, value: Any, default: Any) -> int | float | str:
                 raise TypeError
             return int(value)
         except (TypeError, ValueError):
-            raise InputError(f"{what} got {value!r}, wanted a whole number") from None
+            raise InputError(f"{what} got {value!r}, expected a whole number") from None
     return str(value)

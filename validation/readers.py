@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Readers of values in files of users, TOML and JSON: each takes what a value is, for messages, and the value.
 
-A reader returns the value, or raises InputError with what was given and what is wanted.
+A reader returns the value, or raises InputError with what was given and what is expected.
 """
 
 import csv
@@ -20,7 +20,7 @@ def read_toml(what: str, path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError(f"{what}: there is no file {path}; wanted a TOML file, see docs/many-scenes.md") from None
+        raise InputError(f"{what}: there is no file {path}; expected a TOML file, see docs/many-scenes.md") from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{what} {path}: it cannot be read: {error}") from error
 
@@ -43,28 +43,30 @@ def read_csv(path: Path) -> list[tuple[int, list[str]]]:
 def read_table(what: str, value: Any) -> Mapping[str, Any]:
     """Return names and values."""
     if not isinstance(value, dict):
-        raise InputError(f"{what}: got {value!r}, wanted a table of names and values")
+        raise InputError(f"{what}: got {value!r}, expected a table of names and values")
     return value
 
 
 def read_list(what: str, value: Any, least: int = 1) -> list[Any]:
     """Return a list of at least so many entries."""
     if not isinstance(value, list) or len(value) < least:
-        raise InputError(f"{what}: got {value!r}, wanted a list" + (f" with at least {least} entries" if least else ""))
+        raise InputError(
+            f"{what}: got {value!r}, expected a list" + (f" with at least {least} entries" if least else "")
+        )
     return value
 
 
 def read_word(what: str, value: Any) -> str:
     """Return a word that is not empty."""
     if not isinstance(value, str) or not value.strip():
-        raise InputError(f"{what}: got {value!r}, wanted a word")
+        raise InputError(f"{what}: got {value!r}, expected a word")
     return value
 
 
 def read_one_of(what: str, value: Any, *, names: Sequence[str]) -> str:
     """Return one of some names."""
     if value not in names:
-        raise InputError(f"{what}: got {value!r}, wanted one of {', '.join(names)}")
+        raise InputError(f"{what}: got {value!r}, expected one of {', '.join(names)}")
     return value
 
 
@@ -72,7 +74,7 @@ def read_number(what: str, value: Any, least: float, most: float, whole: bool = 
     """Return a number within bounds, `whole` or not."""
     if type(value) not in ((int,) if whole else (int, float)) or not least <= value <= most:
         kind = "a whole number" if whole else "a number"
-        raise InputError(f"{what}: got {value!r}, wanted {kind} from {least:g} to {most:g}")
+        raise InputError(f"{what}: got {value!r}, expected {kind} from {least:g} to {most:g}")
     return value
 
 
@@ -88,7 +90,7 @@ def read_named(prefix: str, data: Mapping[str, Any], readers: Mapping[str, Reade
     """Return the values that a table has of some names; it may have some others, and no more."""
     for name in data:
         if name not in (names := (*readers, *others)):
-            raise InputError(f"got {prefix}{name}, wanted one of {', '.join(names)}{nearest(name, names)}")
+            raise InputError(f"got {prefix}{name}, expected one of {', '.join(names)}{nearest(name, names)}")
     return {name: read(prefix + name, data[name]) for name, read in readers.items() if name in data}
 
 

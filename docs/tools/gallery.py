@@ -139,7 +139,7 @@ def chosen_pictures(names: Iterable[str]) -> list[Picture]:
         found = [p for p in known if p.name == name or (name in (p.scene, p.method) and name in p.name)]
         if not found:
             near = nearest(name, [picture.name for picture in known])
-            raise InputError(f"gallery: got {name!r}, wanted the name of a picture, a scene or a method{near}")
+            raise InputError(f"gallery: got {name!r}, expected the name of a picture, a scene or a method{near}")
         chosen |= {picture.name: picture for picture in found}
     return list(chosen.values()) or [picture for picture in known if picture.kind != "page"]
 

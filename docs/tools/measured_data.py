@@ -67,7 +67,7 @@ def _read_object(path: Path, what: str) -> dict[str, Any]:
     """Return the object in a JSON file; raises InputError if the file is not there or holds something else."""
     data = read_json(path, what)
     if not isinstance(data, dict):
-        raise InputError(f"{path}: wanted {what}")
+        raise InputError(f"{path}: expected {what}")
     return data
 
 

@@ -138,13 +138,13 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     kind = _KINDS.get(shape.class_name())
     if kind is None and not shape.is_mesh():
         raise InputError(
-            f"light '{name}': its shape is a {shape.class_name().lower()}; wanted a 'rectangle', 'disk', 'sphere' or "
+            f"light '{name}': its shape is a {shape.class_name().lower()}; expected a 'rectangle', 'disk', 'sphere' or "
             "mesh with an 'area' emitter"
         )
     radiance = _read_radiance(shape.emitter(), name)
     opaque = shape.bsdf().class_name() != "Null"
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
-        raise InputError(f"light '{name}': its shape bounds a medium; wanted a light apart from the bounds of media")
+        raise InputError(f"light '{name}': its shape bounds a medium; expected a light apart from the bounds of media")
     if kind is None:
         return _read_mesh(shape, radiance, opaque)
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
@@ -153,13 +153,13 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     across, up, third = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2]
     sizes = [float(np.linalg.norm(axis)) for axis in ((across, up, third) if kind == "sphere" else (across, up))]
     if not min(sizes) > _LEAST or not np.linalg.norm(np.cross(across, up)) > 1e-12 * sizes[0] * sizes[1]:
-        raise InputError(f"light '{name}': the {kind} has no area; wanted a to_world that leaves it one")
+        raise InputError(f"light '{name}': the {kind} has no area; expected a to_world that leaves it one")
     pairs = [(across, up)] + ([(up, third), (third, across)] if kind == "sphere" else [])
     if any(abs(a @ b) > _SHEARED * np.linalg.norm(a) * np.linalg.norm(b) for a, b in pairs):
-        raise InputError(f"light '{name}': the {kind} is sheared; wanted a to_world of rotations, scales and shifts")
+        raise InputError(f"light '{name}': the {kind} is sheared; expected a to_world of rotations, scales and shifts")
     if kind != "rectangle" and max(sizes) - min(sizes) > _SHEARED * max(sizes):
         scales = " x ".join(f"{size:g}" for size in sizes)
-        raise InputError(f"light '{name}': the {kind} is scaled by {scales}; wanted one scale for all its axes")
+        raise InputError(f"light '{name}': the {kind} is scaled by {scales}; expected one scale for all its axes")
     middle = matrix[:3, 3]
     normal = np.cross(across, up)
     if kind == "sphere":
@@ -183,7 +183,7 @@ def _read_mesh(shape: Any, radiance: Array, opaque: bool) -> AreaLight:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(normals, axis=1)
     if not twice.any():
-        raise InputError(f"light '{shape.id()}': the mesh has no area; wanted triangles that have some")
+        raise InputError(f"light '{shape.id()}': the mesh has no area; expected triangles that have some")
     inverted = shape.has_flipped_normals()
     if shape.has_vertex_normals():
         along = np.einsum("tcx,tx->t", _rows(shape.vertex_normals_buffer())[triangles], normals)
@@ -224,11 +224,11 @@ def _is_folded(light: AreaLight, normals: Array) -> bool:
 def _read_radiance(emitter, name: str) -> Array:
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
-        raise InputError(f"light '{name}': its radiance is textured or spectral; wanted a constant 'rgb' radiance")
+        raise InputError(f"light '{name}': its radiance is textured or spectral; expected a constant 'rgb' radiance")
     value = np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1)
     value = np.broadcast_to(value, 3).copy() if value.size == 1 else value
     if not np.all(np.isfinite(value)) or np.any(value < 0):
         raise InputError(
-            f"light '{name}': its radiance is {value.tolist()}; wanted finite values of 0 or more [W/(m^2 sr)]"
+            f"light '{name}': its radiance is {value.tolist()}; expected finite values of 0 or more [W/(m^2 sr)]"
         )
     return value

@@ -45,7 +45,7 @@ def kernel_nodes(kernel: str) -> int | None:
     name, _, words = kernel.partition("-")
     if name == "quadrature" and words.isdecimal() and 2 <= int(words) <= 64 and int(words) % 2 == 0:
         return int(words)
-    raise InputError(f"kernel: got {kernel!r}, wanted 'exact' or 'quadrature-N' with an even N from 2 to 64")
+    raise InputError(f"kernel: got {kernel!r}, expected 'exact' or 'quadrature-N' with an even N from 2 to 64")
 
 
 def kernel_text(kernel: str, phase: Phase, language: str, rows: Sequence[Sequence[float]] = ()) -> str:
@@ -55,7 +55,7 @@ def kernel_text(kernel: str, phase: Phase, language: str, rows: Sequence[Sequenc
     InputError for a kernel, a phase function or a language that cannot be exported.
     """
     if language not in LANGUAGES:
-        raise InputError(f"language: got {language!r}, wanted one of {', '.join(LANGUAGES)}")
+        raise InputError(f"language: got {language!r}, expected one of {', '.join(LANGUAGES)}")
     nodes = kernel_nodes(kernel)
     parts = [_elementary(), _phase(phase), _exact(phase) if nodes is None else _quadrature(phase, nodes), _RAY]
     if rows:
@@ -174,7 +174,7 @@ def _phase(phase: Phase) -> str:
     if isinstance(phase, Isotropic | Rayleigh):
         return f"{start}{signature}    return {_polynomial(phase.polynomial[::-1], 'up')};\n}}\n"
     raise InputError(
-        f"phase: {phase.name!r} reads a table, which cannot be exported; wanted isotropic, rayleigh, hazy, murky, hg "
+        f"phase: {phase.name!r} reads a table, which cannot be exported; expected isotropic, rayleigh, hazy, murky, hg "
         "or hg-draine:D"
     )
 

@@ -71,13 +71,13 @@ def tile_corners(pixel, camera: Camera, *, by_rays: bool) -> Corners:
     """
     if not by_rays:
         raise InputError(
-            "tolerance: wanted each ray by itself, which evaluation=mesh and vertex do not; use tolerance=0"
+            "tolerance: needs each ray by itself, which evaluation=mesh and vertex do not; use tolerance=0"
         )
     width, height = camera.width, camera.height
     across, down = width // SIDE, height // SIDE
     if width % SIDE or height % SIDE or across < 3 or down < 3:
         raise InputError(
-            f"tolerance: got an image of {width} x {height}, wanted sides that are multiples of {SIDE}, from "
+            f"tolerance: got an image of {width} x {height}, expected sides that are multiples of {SIDE}, from "
             f"{3 * SIDE} on"
         )
     rows, columns = np.divmod(np.array(pixel)[::TILE], width)

@@ -154,7 +154,7 @@ def frame_renderer(
     """
     chosen, light_samples = method_parameters(method, parameters)
     if chosen.uses_kernel and kernel is None:
-        raise InputError(f"method {method.name}: got no kernel, wanted one of realtime.kernels.registry.KERNELS")
+        raise InputError(f"method {method.name}: got no kernel, expected one of realtime.kernels.registry.KERNELS")
     _check_clouds(scene, chosen)
     if chosen.interpolated:
         chosen = between_corners(chosen, scene)
@@ -218,12 +218,12 @@ def _check_clouds(scene: Scene, method: Method) -> None:
         return
     if scene.medium.clouds is None:
         raise InputError(
-            f"method {name}: the scene has no clouds; wanted media with closed bounds in vacuum: give the medium "
+            f"method {name}: the scene has no clouds; expected media with closed bounds in vacuum: give the medium "
             "bounds, or use another method"
         )
     if near:
         raise InputError(
-            f"method {name}: the scene has a light of kind {near[0]}, and clouds are lit from infinity; wanted "
+            f"method {name}: the scene has a light of kind {near[0]}, and clouds are lit from infinity; expected "
             "emitters of type 'directional', and at most one 'constant': replace it or remove it"
         )
 

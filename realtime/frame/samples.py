@@ -28,7 +28,7 @@ def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:
     Raises InputError for no sample at all.
     """
     if samples < 1:
-        raise InputError(f"samples: got {samples}, wanted 1 or more")
+        raise InputError(f"samples: got {samples}, expected 1 or more")
     down = bit_reversed(np.arange(samples, dtype=np.uint32)) / 2.0**32
     middle = down.mean()
     for number in range(samples):

@@ -124,7 +124,7 @@ def quadrature(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light,
 
 def _check(name: str, count: int) -> None:
     if not isinstance(count, int) or count < 1:
-        raise InputError(f"{name}: got {count!r}, wanted a whole number of at least 1")
+        raise InputError(f"{name}: got {count!r}, expected a whole number of at least 1")
 
 
 def _at_angle(geometry: RayGeometry, medium: Homogeneous, light: Light, sigma_t, theta):

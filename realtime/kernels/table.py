@@ -57,7 +57,7 @@ def upload_table(Float, *, size: int = 64):
 
 def _check(size: int) -> None:
     if not isinstance(size, int) or not 2 <= size <= _LARGEST_SIZE:
-        raise InputError(f"size: got {size!r}, wanted a whole number from 2 to {_LARGEST_SIZE}")
+        raise InputError(f"size: got {size!r}, expected a whole number from 2 to {_LARGEST_SIZE}")
 
 
 @prepared_by(upload_table)

@@ -123,7 +123,7 @@ def _coefficients(a, phase: Phase, degree: int, *, printed: bool) -> list:
             f"'taylor' or 'quadrature', or one of {', '.join(PRINTED_PHASES)}"
         )
     if printed and degree > HIGHEST_DEGREE:
-        raise InputError(f"degree: got {degree}, wanted 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
+        raise InputError(f"degree: got {degree}, expected 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
     series = _phase_series(phase, degree, "taylor-printed" if printed else "taylor")
     derived = series_product(_extinction_series(a, degree), series, degree)
     if not printed:
@@ -174,7 +174,7 @@ def _polynomial(geometry: RayGeometry, x0, x1, light: Light, coefficients):
 
 def _check_degree(degree: int) -> None:
     if degree < 0:
-        raise InputError(f"degree: got {degree}, wanted 0 or more")
+        raise InputError(f"degree: got {degree}, expected 0 or more")
 
 
 def _integrated(geometry: RayGeometry, ends, angles, coefficients):

@@ -44,9 +44,9 @@ def _check_phase(words: Any) -> None:
     except ValueError:
         values = [math.nan]
     if len(values) > numbers.get(name, -1) or (name == "hg" and not values) or not all(map(math.isfinite, values)):
-        raise InputError(f"phase: got {words!r}, wanted scene, isotropic, hg:G or hg-draine:DIAMETER [um]")
+        raise InputError(f"phase: got {words!r}, expected scene, isotropic, hg:G or hg-draine:DIAMETER [um]")
     if name == "hg" and not -1 < values[0] < 1:
-        raise InputError(f"phase: got {words!r}, wanted a mean cosine between -1 and 1, such as hg:0.85")
+        raise InputError(f"phase: got {words!r}, expected a mean cosine between -1 and 1, such as hg:0.85")
 
 
 @dataclass(frozen=True)

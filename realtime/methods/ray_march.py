@@ -82,11 +82,11 @@ class RayMarch(Method):
     def _check_together(self) -> None:
         if self.jitter != "none" and (self.sum == "transitions" or self.tolerance):
             raise InputError(
-                f"jitter: got {self.jitter} with sum={self.sum} and tolerance={self.tolerance:g}, wanted "
+                f"jitter: got {self.jitter} with sum={self.sum} and tolerance={self.tolerance:g}, expected "
                 "sum=steps and tolerance=0: a mean of runs is no integral, or neighbours are not alike"
             )
         if self.jitter == "none" and self.animate != "none":
-            raise InputError(f"animate: got {self.animate} without jitter, wanted jitter=white, blue or ign with it")
+            raise InputError(f"animate: got {self.animate} without jitter, expected jitter=white, blue or ign with it")
 
     @property
     def uses_kernel(self):

@@ -54,7 +54,7 @@ def find_method(name: str) -> type[Method]:
     """
     if name.endswith(ENDING):
         if is_shader(own := name.removesuffix(ENDING)):
-            raise InputError(f"method {name}: a shader keeps its own frames; wanted its name without '{ENDING}'")
+            raise InputError(f"method {name}: a shader keeps its own frames; expected its name without '{ENDING}'")
         return with_history(find_method(own))
     if name in METHODS:
         return METHODS[name]
@@ -63,6 +63,6 @@ def find_method(name: str) -> type[Method]:
     if ":" in name:
         return user_method(name)
     raise InputError(
-        f"method: got {name!r}, wanted one of {', '.join(METHODS)}, your own 'module:function', or a shader, 'fog.glsl'"
+        f"method: got {name!r}, expected one of {', '.join(METHODS)}, 'module:function', or a shader, 'fog.glsl'"
         f"{nearest(name, METHODS)}"
     )

@@ -68,7 +68,7 @@ class Unshadowed(Method):
         """Refuse a fog colour where only local lights are."""
         if self.form != "airlight" and all(light.w for light in scene.lights):
             raise InputError(
-                f"form={self.form}: a fog colour has no term for local lights, and the scene has no sun; wanted a "
+                f"form={self.form}: a fog colour has no term for local lights, and the scene has no sun; expected a "
                 "'directional' light, or form=airlight"
             )
 

@@ -32,7 +32,7 @@ from realtime.errors import InputError, root_of
 from realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
 from realtime.parameters import values
 
-_WANTED = "wanted 'module:function' or 'path/to/file.py:function'"
+_WANTED = "expected 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
 
 
@@ -56,7 +56,7 @@ def user_method(name: str) -> type[Method]:
     if isinstance(found, type) or not callable(found):
         kind = "class" if isinstance(found, type) else type(found).__name__
         raise InputError(
-            f"method {name}: this is a {kind}; wanted a function of the view, or a class of airlight.Method"
+            f"method {name}: this is a {kind}; expected a function of the view, or a class of airlight.Method"
         )
     return _of_function(found, name)
 
@@ -70,7 +70,9 @@ def _of_function(function: Any, name: str) -> type[Method]:
         fields = [*(entry for entry in fields if entry[0] != "tolerance"), ("tolerance", float, tolerance())]
     prepare = getattr(function, "prepare", None)
     if prepare is not None and not callable(prepare):
-        raise InputError(f"method {name}: its `prepare` is a {type(prepare).__name__}; wanted a function of the scene")
+        raise InputError(
+            f"method {name}: its `prepare` is a {type(prepare).__name__}; expected a function of the scene"
+        )
 
     def preparation(self, scene):
         if prepare is None:
@@ -79,7 +81,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
             made = prepare(scene, **values(self))
         if not callable(made):
             raise InputError(
-                f"method {name}: `prepare` returned a {type(made).__name__}; wanted a function of the scene"
+                f"method {name}: `prepare` returned a {type(made).__name__}; expected a function of the scene"
             )
 
         def run(now):
@@ -227,12 +229,14 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
     try:
         arguments = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError) as error:
-        raise InputError(f"method {name}: its arguments cannot be read ({error}); wanted a Python function") from error
+        raise InputError(
+            f"method {name}: its arguments cannot be read ({error}); expected a Python function"
+        ) from error
     if not arguments or arguments[0].kind not in (
         inspect.Parameter.POSITIONAL_ONLY,
         inspect.Parameter.POSITIONAL_OR_KEYWORD,
     ):
-        raise InputError(f"method {name}: it takes no view; wanted function(view, *, kernel=None, **parameters)")
+        raise InputError(f"method {name}: it takes no view; expected function(view, *, kernel=None, **parameters)")
     parameters = {}
     takes_kernel = False
     for argument in arguments[1:]:
@@ -241,7 +245,9 @@ def _signature(function: Callable[..., Any], name: str) -> tuple[bool, dict[str,
         if argument.name == "kernel":
             takes_kernel = True
         elif argument.default is inspect.Parameter.empty or argument.kind == inspect.Parameter.POSITIONAL_ONLY:
-            raise InputError(f"method {name}: nothing gives {argument.name!r} a value; wanted a keyword with a default")
+            raise InputError(
+                f"method {name}: nothing gives {argument.name!r} a value; expected a keyword with a default"
+            )
         elif type(argument.default) in _TYPES:  # what has another type cannot be set, and keeps its default
             parameters[argument.name] = argument.default
     return takes_kernel, parameters
@@ -284,7 +290,7 @@ def _summary(function: Any) -> str:
     return text.splitlines()[0] if text else "a user method"
 
 
-_RESULT = "wanted the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
+_RESULT = "expected the radiance of every pixel, an RGB colour or one number: a Dr.Jit array, or NumPy's (pixels, 3)"
 
 
 def checked_radiance(returned: Any, view: View, name: str):
@@ -336,13 +342,13 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
     """
     if not isinstance(returned, Layers):
         raise InputError(
-            f"method {name}: returned a {type(returned).__name__}; wanted realtime.methods.interface.method.Layers"
+            f"method {name}: returned a {type(returned).__name__}; expected realtime.methods.interface.method.Layers"
         )
     fractions = 0 if returned.visibility is None else len(returned.visibility)
     wanted = len(view.lights) if visibility else 0
     if fractions != wanted or (returned.visibility is None) == visibility:
         raise InputError(
-            f"method {name}: returned the visibility of {fractions} lights, wanted that of {wanted}: one for each "
+            f"method {name}: returned the visibility of {fractions} lights, expected that of {wanted}: one for each "
             "light where `provides_visibility`, otherwise None"
         )
     return replace(returned, in_scattered=checked_radiance(returned.in_scattered, view, name))

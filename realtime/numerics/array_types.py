@@ -47,7 +47,7 @@ def array_types(precision: str = "single") -> ArrayTypes:
         return ArrayTypes(mi.Float, mi.Vector3f, mi.Color3f)
     if precision == "double":
         return ArrayTypes(mi.Float64, mi.Vector3d, mi.Color3d)
-    raise InputError(f"precision: got {precision!r}, wanted one of {', '.join(PRECISIONS)}")
+    raise InputError(f"precision: got {precision!r}, expected one of {', '.join(PRECISIONS)}")
 
 
 def types_of(Float) -> ArrayTypes:

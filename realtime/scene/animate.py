@@ -98,7 +98,7 @@ def thicker_medium(medium: Medium, factor: float) -> Medium:
     Raises InputError for a factor that is negative or not finite.
     """
     if not 0 <= factor < np.inf:
-        raise InputError(f"factor of the extinction: got {factor!r}, wanted a finite value of 0 or more")
+        raise InputError(f"factor of the extinction: got {factor!r}, expected a finite value of 0 or more")
     return medium.thicker(factor)
 
 
@@ -123,7 +123,7 @@ def read_objects(scene: Scene, names: Sequence[str]) -> Objects:
     for name in names:
         key = f"{name}.vertex_positions"
         if key not in parameters:
-            raise InputError(f"shape {name!r} cannot move: wanted the name of a mesh (obj, ply) in the scene")
+            raise InputError(f"shape {name!r} cannot move: expected the name of a mesh (obj, ply) in the scene")
         vertices[name] = np.array(parameters[key], dtype=np.float32).reshape(-1, 3)
     facets = None
     if scene.facets is not None:

@@ -109,10 +109,10 @@ def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
     """
     sensors = scene.sensors()
     if not sensors:
-        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
+        raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
     sensor = sensors[0]
     if sensor.class_name() != "PerspectiveCamera":
-        raise InputError(f"the scene's sensor is a {sensor.class_name()}; wanted a sensor of type 'perspective'")
+        raise InputError(f"the scene's sensor is a {sensor.class_name()}; expected a sensor of type 'perspective'")
     parameters = mi.traverse(sensor)
     width, height = (int(n) for n in parameters["film.size"])
     if list(parameters["film.crop_size"]) != [width, height]:

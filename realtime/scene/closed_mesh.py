@@ -76,7 +76,7 @@ def closed_mesh(name: str, vertices: Array, faces: NDArray[Any]) -> ClosedMesh:
 def _open(mesh: ClosedMesh, tail: int, head: int, why: str) -> InputError:
     return InputError(
         f"shape '{mesh.name}' bounds a medium and is not a closed surface: {mesh.edge_words(tail, head)}, {why}; "
-        "wanted a closed mesh in which two triangles meet at every edge, and run along it in opposite ways"
+        "expected a closed mesh in which two triangles meet at every edge, and run along it in opposite ways"
     )
 
 
@@ -201,7 +201,7 @@ def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:
 
 
 def _refusal(name: str, flaw: str, wanted: str) -> InputError:
-    return InputError(f"shape '{name}' bounds a medium and {flaw}; wanted {wanted}")
+    return InputError(f"shape '{name}' bounds a medium and {flaw}; expected {wanted}")
 
 
 def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:

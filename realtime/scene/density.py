@@ -113,7 +113,7 @@ def read_cloud_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
         place = ", ".join(f"{x:.6g}" for x in mesh.vertices[vertex])
         raise InputError(
             f"{name} has a grid that does not cover the shape: vertex {mesh.own[vertex]} at ({place}) lies beside it; "
-            "wanted a to_world of the volume whose unit cube holds the shape"
+            "expected a to_world of the volume whose unit cube holds the shape"
         )
     return grid
 
@@ -126,29 +126,29 @@ def read_density(medium: Any, name: str) -> DensityGrid:
     """
     parameters = mi.traverse(medium)
     if "sigma_t.data" not in parameters:
-        raise InputError(f"{name} has an extinction that is no grid; wanted a 'gridvolume' as sigma_t")
+        raise InputError(f"{name} has an extinction that is no grid; expected a 'gridvolume' as sigma_t")
     if "albedo.value.value" not in parameters:
         raise InputError(
-            f"{name} has an albedo that differs from place to place; wanted one number or colour: a 'constvolume'"
+            f"{name} has an albedo that differs from place to place; expected one number or colour: a 'constvolume'"
         )
     values = np.array(parameters["sigma_t.data"], dtype=np.float64)
     if values.ndim == 4 and values.shape[3] > 1:
         raise InputError(
-            f"{name} has an extinction of {values.shape[3]} channels on its grid; wanted one channel: grey"
+            f"{name} has an extinction of {values.shape[3]} channels on its grid; expected one channel: grey"
         )
     values = values.reshape(values.shape[:3])
     wrong = ~(np.isfinite(values) & (values >= 0))
     if wrong.any():
         z, y, x = (int(index) for index in np.argwhere(wrong)[0])
         raise InputError(
-            f"{name} has {values[z, y, x]:g} in voxel ({x}, {y}, {z}), and {int(wrong.sum())} such in all; wanted "
+            f"{name} has {values[z, y, x]:g} in voxel ({x}, {y}, {z}), and {int(wrong.sum())} such in all; expected "
             "finite densities of 0 or more"
         )
     scale, largest = float(np.array(parameters["scale"]).ravel()[0]), float(values.max())
     if not (scale >= 0 and np.isfinite(scale)):
-        raise InputError(f"{name} has the scale {scale:g}; wanted a finite number of 0 or more")
+        raise InputError(f"{name} has the scale {scale:g}; expected a finite number of 0 or more")
     if not largest * scale > 0:
-        raise InputError(f"{name} is empty: its grid is 0 everywhere; wanted densities above 0 somewhere")
+        raise InputError(f"{name} is empty: its grid is 0 everywhere; expected densities above 0 somewhere")
     grid = DensityGrid((values / largest).astype(np.float32), largest * scale, _transform(medium))
     _compare(name, medium, grid)
     return grid
@@ -160,7 +160,7 @@ def _transform(medium: Any) -> Array:
     rows = re.search(r"matrix=\[(.*?)\]\]", words, re.S)
     box = re.search(r"min = \[(.*?)\],\s*max = \[(.*?)\]", words, re.S)
     if rows is None or box is None:
-        raise InputError(f"Mitsuba says nothing of the grid of the {medium.class_name()}; wanted a 'gridvolume'")
+        raise InputError(f"Mitsuba says nothing of the grid of the {medium.class_name()}; expected a 'gridvolume'")
     matrix = np.array([float(number) for number in re.findall(r"[-+\w.]+", rows[1])]).reshape(4, 4)[:3, :3]
     return np.column_stack([matrix, 0.5 - matrix @ _middle(medium, box)])
 
@@ -189,7 +189,7 @@ def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
     worst = float(np.abs(np.array(sigma_t)[0] - own).max()) / grid.largest
     if worst > _DIFFERENCE:
         raise InputError(
-            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "
+            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; expected a "
             "'gridvolume' with the filter_type 'trilinear'"
         )
 

@@ -142,7 +142,7 @@ def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
         return mesh_triangles(shape)
     raise InputError(
         f"shape '{shape.id()}' is a {shape.class_name().lower()}, which has no triangles and so no silhouette edges; "
-        "wanted meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
+        "expected meshes (obj, ply, cube, rectangle); replace it by a mesh, or use --method ray-march"
     )
 
 

@@ -261,7 +261,7 @@ class HgDraine(Phase):
 
     def __post_init__(self):
         if not 5 <= self.diameter <= 50:
-            raise InputError(f"the diameter of 'hg-draine' is {self.diameter} um; wanted 5 to 50 um")
+            raise InputError(f"the diameter of 'hg-draine' is {self.diameter} um; expected 5 to 50 um")
 
     @property
     def lobes(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -381,11 +381,11 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
     name, *cells = words.split(":")
     by_name = {phase.name: phase for phase in PHASES}
     if name not in by_name:
-        raise InputError(f"the phase function is '{words}'; wanted one of {', '.join(by_name)}")
+        raise InputError(f"the phase function is '{words}'; expected one of {', '.join(by_name)}")
     try:
         numbers = [float(cell) for cell in cells]
     except ValueError:
-        raise InputError(f"the phase function is '{words}'; wanted numbers after '{name}:'") from None
+        raise InputError(f"the phase function is '{words}'; expected numbers after '{name}:'") from None
     if len(numbers) > {HenyeyGreenstein.name: 1, HgDraine.name: 1, Mie.name: 3, ModifiedMie.name: 3}.get(name, 0):
         raise InputError(f"the phase function is '{words}'; it has fewer numbers: leave some out")
     if name in (Mie.name, ModifiedMie.name):
@@ -394,7 +394,7 @@ def named_phase(words: str, *, g=None, values=None, Float: Any = None) -> Phase:
         return HgDraine(*numbers) if numbers else HgDraine(12.0)
     if name == HenyeyGreenstein.name:
         if numbers and not -1 < numbers[0] < 1:
-            raise InputError(f"the mean cosine of '{words}' is {numbers[0]:g}; wanted more than -1, less than 1")
+            raise InputError(f"the mean cosine of '{words}' is {numbers[0]:g}; expected more than -1, less than 1")
         return HenyeyGreenstein((Float or mi.Float)(numbers[0]) if numbers else g)
     if name == Tabulated.name:
         return Tabulated(values) if values is None else tabulated(values)

@@ -60,18 +60,18 @@ def sort_shapes(scene):
         if bsdf.class_name() != "Null":
             if bounds:
                 raise InputError(
-                    f"shape '{name}' bounds a medium and has a {bsdf.class_name()} material; wanted the material "
+                    f"shape '{name}' bounds a medium and has a {bsdf.class_name()} material; expected the material "
                     "'null' on it, and no media on other shapes"
                 )
             if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null):
-                raise InputError(f"shape '{name}' is partly transparent; wanted opaque surfaces or material 'null'")
+                raise InputError(f"shape '{name}' is partly transparent; expected opaque surfaces or material 'null'")
             opaque.append(shape)
         elif shape.interior_medium() is not None:
             boundaries.append(shape)
         elif bounds:
-            raise InputError(f"shape '{name}' is a hole in a medium; wanted media inside of closed bounds")
+            raise InputError(f"shape '{name}' is a hole in a medium; expected media inside of closed bounds")
         else:
-            raise InputError(f"shape '{name}' is transparent and bounds no medium; wanted opaque surfaces: remove it")
+            raise InputError(f"shape '{name}' is transparent and bounds no medium; expected opaque surfaces: remove it")
     return opaque, boundaries
 
 
@@ -115,7 +115,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
         for own in (shape.interior_medium(), shape.exterior_medium()):
             if _is_height_fog(own):
                 raise InputError(
-                    f"shape '{shape.id()}' bounds a medium in height fog, or height fog; wanted height fog alone, in "
+                    f"shape '{shape.id()}' bounds a medium in height fog, or height fog; expected height fog alone, in "
                     "the sensor: remove the medium of the shape"
                 )
     shapes = [read_bounds(shape) for shape in boundaries]
@@ -127,7 +127,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
     if around is not None and not all_convex:
         raise InputError(
             f"shape '{_first_cloud(shapes, uneven)}' bounds a medium within another one and is not convex, or that "
-            "medium is not homogeneous; wanted vacuum around it: remove the exterior medium, and the camera's"
+            "medium is not homogeneous; expected vacuum around it: remove the exterior medium, and the camera's"
         )
     grids = [
         read_cloud_density(shape.interior_medium(), meshes[number])
@@ -161,7 +161,7 @@ def _closed_meshes(
             cloud = _first_cloud(shapes, uneven)
             flaw = "bounds a heterogeneous medium" if cloud in uneven else "is not convex"
             raise InputError(
-                f"shape '{bounds.name}' is a sphere, and shape '{cloud}' {flaw}; wanted meshes for all of them: "
+                f"shape '{bounds.name}' is a sphere, and shape '{cloud}' {flaw}; expected meshes for all of them: "
                 "replace the sphere by a mesh"
             )
     return tuple(mesh for _, mesh in shapes if mesh is not None)
@@ -215,7 +215,7 @@ def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
         if shape.exterior_medium() != around:
             raise InputError(
                 f"the exterior medium of shape '{own_bounds.name}' is not what surrounds the camera or the others; "
-                "wanted one medium around all bounded media, or none at all"
+                "expected one medium around all bounded media, or none at all"
             )
     return around
 
@@ -278,13 +278,13 @@ def _require_constant(medium, *coefficients: str) -> None:
     for name in coefficients:
         if not any(key.startswith(f"{name}.value.") for key in mi.traverse(medium).keys()):  # noqa: SIM118 - of pairs
             raise InputError(
-                f"medium '{medium.id()}': its {name} differs from place to place; wanted one number or one 'rgb'"
+                f"medium '{medium.id()}': its {name} differs from place to place; expected one number or one 'rgb'"
             )
 
 
 def _check_albedo(albedo) -> None:
     if np.any(albedo > 1 + 1e-6):
-        raise InputError(f"the medium's albedo is {np.round(albedo, 6).tolist()}; wanted values from 0 to 1")
+        raise InputError(f"the medium's albedo is {np.round(albedo, 6).tolist()}; expected values from 0 to 1")
 
 
 def _is_height_fog(medium) -> bool:
@@ -319,7 +319,7 @@ def _grid_medium(medium, types: ArrayTypes) -> GridMedium:
     sides = grid.to_grid[:, :3]
     if np.abs(sides - np.diag(np.diag(sides))).max() > 1e-5 * np.abs(sides).max() or np.diag(sides).min() <= 0:
         raise InputError(
-            f"{name} has a grid whose box is turned or mirrored; wanted a to_world that scales and moves alone"
+            f"{name} has a grid whose box is turned or mirrored; expected a to_world that scales and moves alone"
         )
     corner = -grid.to_grid[:, 3] / np.diag(sides)
     low, high = (types.vector(*(float(each) for each in end)) for end in (corner, corner + 1 / np.diag(sides)))
@@ -330,7 +330,7 @@ def _grid_medium(medium, types: ArrayTypes) -> GridMedium:
 
 def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     if not medium.is_homogeneous():
-        raise InputError("the medium is heterogeneous; wanted a medium of type 'homogeneous'")
+        raise InputError("the medium is heterogeneous; expected a medium of type 'homogeneous'")
     _require_constant(medium, "sigma_t", "albedo")
     sigma_s, _, sigma_t = medium.get_scattering_coefficients(dr.zeros(mi.MediumInteraction3f))
     dr.eval(sigma_s, sigma_t)  # in one kernel: Mitsuba's scale is a literal in it
@@ -338,7 +338,7 @@ def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
     for name, values in (("sigma_t", extinction), ("sigma_s = albedo sigma_t", scattering)):
         if not np.all(np.isfinite(values)) or np.any(values < 0):
-            raise InputError(f"the medium's {name} is {values.tolist()}; wanted finite values of 0 or more [1/m]")
+            raise InputError(f"the medium's {name} is {values.tolist()}; expected finite values of 0 or more [1/m]")
     albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
     _check_albedo(albedo)
     grey = extinction[0] == extinction[1] == extinction[2]
@@ -352,7 +352,7 @@ def _read_phase(phase, types: ArrayTypes) -> Phase:
     name = _PHASES.get(phase.class_name())
     if name is None:
         raise InputError(
-            f"the phase function is a {phase.class_name()}; wanted one of isotropic, hg, rayleigh, tabphase"
+            f"the phase function is a {phase.class_name()}; expected one of isotropic, hg, rayleigh, tabphase"
         )
     parameters = mi.traverse(phase)
     if name == "hg":

@@ -130,7 +130,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
     medium, meshes = read_medium(sensor, boundaries, types)
     if not scene.emitters():
         raise InputError(
-            "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
+            "the scene has no light; expected at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
     bodies = _Bodies(medium, meshes, opaque)
     behind = backgrounds(scene, clouds=medium.clouds is not None)
@@ -180,12 +180,12 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
         word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}
         raise InputError(
             f"light '{emitter.id()}' of type '{word.get(emitter.class_name(), emitter.class_name())}' lights no fog; "
-            "wanted lights of type 'point', 'spot', 'directional' or 'area'"
+            "expected lights of type 'point', 'spot', 'directional' or 'area'"
         )
     parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters or (kind == "spot" and "texture.value" not in parameters):
         raise InputError(
-            f"light '{emitter.id()}' of type '{kind}' has a texture or a spectrum as intensity; wanted one 'rgb' value"
+            f"light '{emitter.id()}' of type '{kind}' has a texture or a spectrum as intensity; give one 'rgb' value"
         )
     intensity = _read_colour(parameters["intensity.value"], f"the {kind} light's intensity", "W/sr")
     matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
@@ -209,16 +209,16 @@ def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
         if not axis @ np.array(medium.up, dtype=np.float64).ravel() < 0:
             raise InputError(
                 f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths "
-                "through height fog, which has no sides, is infinitely deep; wanted a light from above the horizon"
+                "through height fog, which has no sides, is infinitely deep; expected a light from above the horizon"
             )
     elif not (isinstance(medium, GridMedium) or (medium.clear and medium.clouds)):
         raise InputError(
             "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
-            "infinity: wanted media with bounds in vacuum; give the medium bounds, or use a 'point' or 'spot' light"
+            "infinity: needs media with bounds in vacuum; give the medium bounds, or use a 'point' or 'spot' light"
         )
     parameters = mi.traverse(emitter)
     if "irradiance.value" not in parameters:
-        raise InputError("the directional light has a textured or spectral irradiance; wanted a constant 'rgb' one")
+        raise InputError("the directional light has a textured or spectral irradiance; expected a constant 'rgb' one")
     irradiance = _read_colour(parameters["irradiance.value"], "the directional light's irradiance", "W/m^2")
     arrays: dict[str, Any] = {"intensity": types.color(*(float(c) for c in irradiance))}
     arrays |= bodies.beam(axis, types)
@@ -233,7 +233,7 @@ def _read_sky(emitter, bodies: _Bodies, up: NDArray[np.float64], types: ArrayTyp
     """
     parameters = mi.traverse(emitter)
     if "radiance.value" not in parameters:
-        raise InputError("the constant emitter has a textured or spectral radiance; wanted a constant 'rgb' one")
+        raise InputError("the constant emitter has a textured or spectral radiance; expected a constant 'rgb' one")
     radiance = _read_colour(parameters["radiance.value"], "the constant emitter's radiance", "W/(m^2 sr)")
     arrays: dict[str, Any] = {
         "intensity": types.color(*(math.pi * float(c) for c in radiance)),
@@ -277,7 +277,7 @@ def _read_colour(value, name: str, unit: str):
     colour = np.array(value, dtype=np.float64).reshape(-1)
     colour = np.broadcast_to(colour, 3) if colour.size == 1 else colour
     if not np.all(np.isfinite(colour)) or np.any(colour < 0):
-        raise InputError(f"{name} is {colour.tolist()}; wanted finite values of 0 or more [{unit}]")
+        raise InputError(f"{name} is {colour.tolist()}; expected finite values of 0 or more [{unit}]")
     return colour
 
 
@@ -287,7 +287,7 @@ def _read_angles(parameters) -> tuple[float, float]:
     beam = min(math.radians(float(parameters["beam_width"][0])), cutoff)
     if not 0 < cutoff < 0.5 * math.pi:
         raise InputError(
-            f"the spot light's cutoff_angle is {math.degrees(cutoff):g} degrees; wanted more than 0, less than 90"
+            f"the spot light's cutoff_angle is {math.degrees(cutoff):g} degrees; expected more than 0, less than 90"
         )
     return cutoff, beam
 

@@ -48,7 +48,7 @@ def check_size(size) -> None:
     Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     if not isinstance(size, int) or size < 4 or size > 8192 or size & (size - 1):
-        raise InputError(f"map: got {size!r}, wanted a power of two from 4 to 8192")
+        raise InputError(f"map: got {size!r}, expected a power of two from 4 to 8192")
 
 
 def map_size(default: int, help: str) -> Any:

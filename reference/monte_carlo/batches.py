@@ -44,7 +44,7 @@ def check_samples(samples: int) -> None:
     Raises ValueError for none, or for more than a batch can add up, `LARGEST_BATCH`.
     """
     if not 1 <= samples <= LARGEST_BATCH:
-        raise ValueError(f"samples: got {samples}, wanted 1 to {LARGEST_BATCH}")
+        raise ValueError(f"samples: got {samples}, expected 1 to {LARGEST_BATCH}")
 
 
 def single_batch(seed: int, samples: int, mean: Array, *, layers: tuple[str, ...] = LAYERS) -> Batches:

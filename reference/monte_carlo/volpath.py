@@ -70,7 +70,7 @@ def volpath_batch(
     """
     check_samples(samples)
     if max_depth < 2:
-        raise ValueError(f"max_depth: got {max_depth}, wanted at least 2, one scattering")
+        raise ValueError(f"max_depth: got {max_depth}, expected at least 2, one scattering")
     if counts is not None and max_depth != 2:
         raise ValueError("counts: got some with multiple scattering, whose layers are traced along the same paths")
     in_air, on_surface = np.full((2, reference.width * reference.height), samples) if counts is None else counts
@@ -110,7 +110,7 @@ def _check_far(reference: ReferenceScene) -> None:
     if radius < needed:
         raise InputError(
             f"volpath: the light paths of a sun or a sky end within the fog, since the shapes of the scene have a "
-            f"radius of {radius:.4g} m; wanted {needed:.4g} m: add ground, or lower the cap of height fog"
+            f"radius of {radius:.4g} m; expected {needed:.4g} m: add ground, or lower the cap of height fog"
         )
 
 

@@ -72,7 +72,7 @@ def quadrature_image(
     if pixel == "area":
         return _means(reference, tolerance, plan, progress, how)
     if pixel != "centre":
-        raise InputError(f"pixel is '{pixel}'; wanted 'centre' or 'area'")
+        raise InputError(f"pixel is '{pixel}'; expected 'centre' or 'area'")
     values = ray_values(reference, progress=progress, plan=plan, keep=keep, **how)
     layers = np.concatenate([values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1)
     return _image(reference, values, layers, values.bound, values.replicates if reference.is_sampled else None)

@@ -192,4 +192,4 @@ def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
 
 
 def _refusal(shape: Any, given: str, wanted: str) -> InputError:
-    return InputError(f"light '{shape.id()}' {given}; wanted {wanted}")
+    return InputError(f"light '{shape.id()}' {given}; expected {wanted}")

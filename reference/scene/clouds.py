@@ -112,23 +112,23 @@ def read_clouds(scene) -> CloudScene:
     Raises InputError for a scene without clouds, sun or sky, or with what has no place among them, by its name.
     """
     if not scene.sensors():
-        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
+        raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     if sensor.class_name() != "PerspectiveCamera":
-        raise InputError(f"the camera is a {sensor.class_name()}; wanted a sensor of type 'perspective'")
+        raise InputError(f"the camera is a {sensor.class_name()}; expected a sensor of type 'perspective'")
     suns, sky = _lights(scene)
     opaque, boundaries = sorted_shapes(scene)
     if not boundaries:
-        raise InputError("the scene has no cloud; wanted a closed shape of material 'null' with an interior medium")
+        raise InputError("the scene has no cloud; expected a closed shape of material 'null' with an interior medium")
     for shape in opaque:
         if mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Delta):
             raise InputError(
                 f"shape '{shape.id()}' has a {shape.bsdf().class_name()} material, a mirror: paths cannot find the sun "
-                "in it; wanted a rough one"
+                "in it; expected a rough one"
             )
     for shape in boundaries:
         if shape.exterior_medium() is not None:
-            raise InputError(f"the exterior medium of shape '{shape.id()}' is not vacuum; wanted none around clouds")
+            raise InputError(f"the exterior medium of shape '{shape.id()}' is not vacuum; expected none around clouds")
     clouds = tuple(_read_cloud(shape) for shape in boundaries)
     width, height = (int(n) for n in sensor.film().size())
     origin = camera_matrix(sensor)[:3, 3]
@@ -160,9 +160,9 @@ def _lights(scene) -> tuple[tuple[DirectionalLight, ...], Array]:
                 "and 'constant'"
             )
     if len(skies) > 1:
-        raise InputError(f"the scene has {len(skies)} emitters of type 'constant'; wanted at most one sky")
+        raise InputError(f"the scene has {len(skies)} emitters of type 'constant'; expected at most one sky")
     if not suns and not skies:
-        raise InputError("the scene has no light; wanted an emitter of type 'directional' or 'constant'")
+        raise InputError("the scene has no light; expected an emitter of type 'directional' or 'constant'")
     return tuple(suns), skies[0] if skies else np.zeros(3)
 
 
@@ -223,8 +223,8 @@ def _read_density(shape: Any, name: str) -> CloudDensity:
     margin = _BEYOND * (high - low)
     if np.any(np.array(box.min).ravel() < low - margin) or np.any(np.array(box.max).ravel() > high + margin):
         raise InputError(
-            f"{name} has a grid that does not cover the shape: it reaches from {_words(low)} to {_words(high)}; wanted "
-            "a to_world of the volume whose unit cube holds the shape"
+            f"{name} has a grid that does not cover the shape: it reaches from {_words(low)} to {_words(high)}; "
+            "expected a to_world of the volume whose unit cube holds the shape"
         )
     voxel = float(((high - low) / values.shape[2::-1]).min())
     return CloudDensity(medium, float(values.max()), voxel)

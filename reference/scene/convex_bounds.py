@@ -127,7 +127,7 @@ def _edges(shape: Any, faces: Index) -> tuple[Index, Index]:
 
 
 def _refusal(shape: Any, fault: str, wanted: str) -> InputError:
-    return InputError(f"shape '{shape.id()}' bounds a medium and {fault}; wanted {wanted}")
+    return InputError(f"shape '{shape.id()}' bounds a medium and {fault}; expected {wanted}")
 
 
 def holds(bounds: Bounds, point: Array) -> bool:

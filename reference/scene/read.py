@@ -112,7 +112,7 @@ def read_reference(scene) -> ReferenceScene:
     Raises InputError for a scene whose reference cannot be computed, with the name of what is in the way.
     """
     if not scene.sensors():
-        raise InputError("the scene has no camera; wanted a sensor of type 'perspective'")
+        raise InputError("the scene has no camera; expected a sensor of type 'perspective'")
     sensor = scene.sensors()[0]
     width, height = (int(n) for n in sensor.film().size())
     background = _background(scene)
@@ -122,7 +122,7 @@ def read_reference(scene) -> ReferenceScene:
     near = tuple(emitter for emitter in emitters if not is_directional(emitter) and not is_area(emitter))
     if not far + near + wide and background is None:
         raise InputError(
-            "the scene has no light; wanted at least one emitter of type 'point', 'spot', 'directional' or 'area'"
+            "the scene has no light; expected at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
     lights = tuple(_read_light(emitter) for emitter in near)
     origin = camera_matrix(sensor)[:3, 3]
@@ -141,7 +141,7 @@ def read_reference(scene) -> ReferenceScene:
         if isinstance(medium, HeightMedium) and not -sun.direction @ medium.up > 0:
             raise InputError(
                 f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths "
-                "through height fog, which has no sides, is infinitely deep; wanted a light from above the horizon"
+                "through height fog, which has no sides, is infinitely deep; expected a light from above the horizon"
             )
     sky = _sky(background, medium)
     if not far + near + wide and sky is None:
@@ -189,7 +189,7 @@ def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
         return None
     if isinstance(medium, ReferenceMedium) and np.any(medium.sigma_t > 0):
         if not np.all(medium.sigma_t > 0):
-            raise InputError("a sky shines through a medium without bounds in some channels; wanted bounds")
+            raise InputError("a sky shines through a medium without bounds in some channels; expected bounds")
         return None
     return _rgb(background.eval(dr.zeros(mi.SurfaceInteraction3f)))
 
@@ -218,10 +218,12 @@ def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
         inside, outside = shape.interior_medium(), shape.exterior_medium()
         null = shape.bsdf().class_name() == "Null"
         if not null and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
-            raise InputError(f"shape '{shape.id()}' is partly transparent; wanted opaque surfaces, or material 'null'")
+            raise InputError(
+                f"shape '{shape.id()}' is partly transparent; expected opaque surfaces, or material 'null'"
+            )
         if not null and (inside is not None or outside is not None):
             raise InputError(
-                f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} material; wanted the "
+                f"shape '{shape.id()}' bounds a medium and has a {shape.bsdf().class_name()} material; expected the "
                 "material 'null' on it, and no media on other shapes"
             )
         if not null:
@@ -229,7 +231,7 @@ def sorted_shapes(scene) -> tuple[list[Any], list[Any]]:
         elif inside is not None:
             boundaries.append(shape)
         elif outside is not None:
-            raise InputError(f"shape '{shape.id()}' is a hole in a medium; wanted media inside of convex bounds")
+            raise InputError(f"shape '{shape.id()}' is a hole in a medium; expected media inside of convex bounds")
     return opaque, boundaries
 
 
@@ -267,14 +269,14 @@ def _read_ambient(
     for medium, shape in zip(media, boundaries, strict=True):
         if shape.exterior_medium() != ambient:
             raise InputError(
-                f"the exterior medium of shape '{medium.name}' is not what surrounds the others or the camera; wanted "
-                "the medium that the camera references as exterior of all shapes, or none at all"
+                f"the exterior medium of shape '{medium.name}' is not what surrounds the others or the camera; "
+                "expected the medium that the camera references as exterior of all shapes, or none at all"
             )
     if is_height_fog(ambient) or is_grid(ambient):
         kind = "height fog" if is_height_fog(ambient) else "a density grid"
         if media:
             raise InputError(
-                f"shape '{media[0].name}' bounds a medium in {kind}; wanted {kind} alone: remove the medium of the "
+                f"shape '{media[0].name}' bounds a medium in {kind}; expected {kind} alone: remove the medium of the "
                 "shape, or take a medium of type 'homogeneous' around it"
             )
         return (read_height_fog if is_height_fog(ambient) else read_grid)(ambient, *read_scattering(ambient))
@@ -303,7 +305,7 @@ def _grid_in_a_shape(sensor, boundaries: list[Any], origin: Array) -> GridMedium
     if own not in ((inside,) if holds(bounds, origin) else (None, inside)):
         raise InputError(
             f"the camera references another medium than that of shape '{shape.id()}', a density grid, or is in the "
-            "shape and references none; wanted that medium"
+            "shape and references none; expected that medium"
         )
     return grid
 
@@ -318,11 +320,11 @@ def _read_bounded(shape) -> BoundedMedium:
 def read_medium(medium, name: str) -> ReferenceMedium:
     """Read a homogeneous medium; messages call it by `name`."""
     if is_height_fog(medium):
-        raise InputError(f"{name} is height fog, which has no sides; wanted it in the sensor, and no shape around it")
+        raise InputError(f"{name} is height fog, which has no sides; expected it in the sensor, and no shape around it")
     if not medium.is_homogeneous():
         raise InputError(
-            f"{name} is heterogeneous; wanted a medium of type 'homogeneous', or a density grid in the sensor, or one "
-            "in vacuum in a convex shape that holds its whole box"
+            f"{name} is heterogeneous; expected a medium of type 'homogeneous', or a density grid in the sensor, or "
+            "one in vacuum in a convex shape that holds its whole box"
         )
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)
@@ -339,7 +341,7 @@ def read_scattering(medium) -> tuple[Array, PhaseFunction]:
 
 def _require_constant(parameters, coefficient: str, name: str) -> None:
     if f"{coefficient}.value.value" not in parameters:
-        raise InputError(f"{name}: its {coefficient} differs from place to place; wanted one number or one 'rgb'")
+        raise InputError(f"{name}: its {coefficient} differs from place to place; expected one number or one 'rgb'")
 
 
 def _read_phase(phase) -> PhaseFunction:
@@ -353,7 +355,7 @@ def _read_phase(phase) -> PhaseFunction:
         return PhaseFunction("hg", g=float(parameters["g"][0]))
     if name == "TabulatedPhaseFunction":
         return PhaseFunction("tabulated", table=tuple(float(v) for v in np.array(parameters["values"])))
-    raise InputError(f"the phase function is a {name}; wanted one of isotropic, hg, rayleigh, tabphase")
+    raise InputError(f"the phase function is a {name}; expected one of isotropic, hg, rayleigh, tabphase")
 
 
 def _read_light(emitter) -> ReferenceLight:
@@ -361,7 +363,7 @@ def _read_light(emitter) -> ReferenceLight:
     if name not in ("PointLight", "SpotLight"):
         word = {"ConstantBackgroundEmitter": "constant", "EnvironmentMapEmitter": "envmap"}.get(name, name)
         raise InputError(
-            f"light '{emitter.id()}' of type '{word}' is the scene's only light; wanted lights of type 'point', "
+            f"light '{emitter.id()}' of type '{word}' is the scene's only light; expected lights of type 'point', "
             "'spot', 'directional', 'area' or 'constant'"
         )
     parameters = mi.traverse(emitter)

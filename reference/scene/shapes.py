@@ -75,11 +75,11 @@ def _read(shape) -> Array | Sphere | Disks:
         return Sphere(matrix[:3, 3], float(length[0]))
     if shape.class_name() != "Disk":
         raise InputError(
-            f"shape '{shape.id()}' is a {shape.class_name().lower()}; wanted meshes, rectangles, spheres and disks, "
+            f"shape '{shape.id()}' is a {shape.class_name().lower()}; expected meshes, rectangles, spheres and disks, "
             "whose shadows are exact: replace it by a mesh, as fine as you need"
         )
     if abs(length[0] - length[1]) > _ROUND * length[0] or abs(matrix[:3, 0] @ matrix[:3, 1]) > _ROUND * length[0] ** 2:
-        raise InputError(f"shape '{shape.id()}' is an oval disk; wanted a round one, or a mesh")
+        raise InputError(f"shape '{shape.id()}' is an oval disk; expected a round one, or a mesh")
     normal = np.cross(matrix[:3, 0], matrix[:3, 1])
     return Disks(matrix[None, :3, 3], normal[None] / np.linalg.norm(normal), length[:1])
 

@@ -26,7 +26,7 @@ from analytic.phase import PhaseFunction
 Array = NDArray[np.float64]
 
 NO_EXTINCTION = (
-    "the medium has an extinction that differs from place to place, and this asks for one number; wanted a medium of "
+    "the medium has an extinction that differs from place to place, and this asks for one number; expected a medium of "
     "type 'homogeneous'"
 )
 _PLACES = 512  # at which extinctions are compared
@@ -148,7 +148,7 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
     worst = np.abs(theirs - _trilinear(values, fraction * values.shape[::-1] - 0.5)).max() / values.max()
     if worst > _DIFFERENCE:
         raise InputError(
-            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; wanted a "
+            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; expected a "
             "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales and moves alone"
         )
     return grid
@@ -163,12 +163,12 @@ def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
     parameters = mi.traverse(medium)
     values = np.array(parameters["sigma_t.data"], dtype=np.float64)
     if values.ndim > 3 and values.shape[3] != 1:
-        raise InputError(f"{name} has a grid of {values.shape[3]} channels; wanted a grid of one: grey extinction")
+        raise InputError(f"{name} has a grid of {values.shape[3]} channels; expected a grid of one: grey extinction")
     values = values.reshape(values.shape[:3]) * float(np.array(parameters["scale"]).ravel()[0])
     if not np.isfinite(values).all() or values.min() < 0:
-        raise InputError(f"{name} has densities below 0 or not finite; wanted finite ones of 0 or more")
+        raise InputError(f"{name} has densities below 0 or not finite; expected finite ones of 0 or more")
     if not values.max() > 0:
-        raise InputError(f"{name} has a grid that is 0 everywhere; wanted densities above 0 somewhere")
+        raise InputError(f"{name} has a grid that is 0 everywhere; expected densities above 0 somewhere")
     return values, *_box(medium)
 
 
@@ -177,7 +177,7 @@ def _box(medium: Any) -> tuple[Array, Array]:
     words = str(medium).partition("sigma_t =")[2]
     found = re.search(r"min = \[(.*?)\],\s*max = \[(.*?)\]", words, re.S)
     if found is None:
-        raise InputError(f"Mitsuba says no box of medium '{medium.id()}'; wanted a 'gridvolume' as sigma_t")
+        raise InputError(f"Mitsuba says no box of medium '{medium.id()}'; expected a 'gridvolume' as sigma_t")
     low, high = (np.array([float(number) for number in part.split(",")]) for part in found.groups())
     middle, corners = 0.5 * (low + high), np.stack([low, high])
     for axis in range(3):

@@ -63,7 +63,7 @@ def cache_limit() -> int:
         return DEFAULT_LIMIT
     size = _SIZE.fullmatch(text)
     if size is None:
-        raise InputError(f"AIRLIGHT_CACHE_SIZE: got {text!r}, wanted a size such as 500MB, 4GiB or a number of bytes")
+        raise InputError(f"AIRLIGHT_CACHE_SIZE: got {text!r}, expected a size such as 500MB, 4GiB or a number of bytes")
     number, prefix, binary = size.groups()
     return int(float(number) * (1024 if binary else 1000) ** " kmgt".index(prefix.lower() or " "))
 

@@ -249,7 +249,7 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
     first = next(iter(layers))
     for name, values in layers.items():
         if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
-            raise InputError(f"layer '{name}' has shape {values.shape}; wanted (height, width, 3), none of them zero")
+            raise InputError(f"layer '{name}' has shape {values.shape}; expected (height, width, 3), none of them zero")
         if values.shape != layers[first].shape:
             raise InputError(f"layers of two sizes: '{first}' {layers[first].shape}, '{name}' {values.shape}")
     if "airlight" in layers:
@@ -267,7 +267,7 @@ def _channels(image: Image) -> dict[str, NDArray[np.float32]]:
     if image.depth is not None:
         depth = _float32(np.asarray(image.depth), "depth")
         if depth.shape != layers[first].shape[:2]:
-            raise InputError(f"depth has shape {depth.shape}; wanted that of the layers, {layers[first].shape[:2]}")
+            raise InputError(f"depth has shape {depth.shape}; expected that of the layers, {layers[first].shape[:2]}")
         channels["depth.Z"] = np.ascontiguousarray(depth)
     return channels
 
@@ -306,7 +306,7 @@ def _attribute(key: str, value: Any) -> Attribute:
     if isinstance(value, float | np.floating):
         number = float(value)
         return str(number) if np.isfinite(number) and abs(number) > float(np.finfo(np.float32).max) else number
-    raise InputError(f"attribute '{key}' is a {type(value).__name__}; wanted text, an integer or a float")
+    raise InputError(f"attribute '{key}' is a {type(value).__name__}; expected text, an integer or a float")
 
 
 def _check_kind(path: str | os.PathLike[str]) -> None:

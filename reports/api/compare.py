@@ -115,7 +115,7 @@ def compare(
     files = [Path(path) for path in several(output)]
     layer, _, holds = (layer or "").partition("=") if "=" in (layer or "") else (layer, "", None)
     if holds not in (None, "airlight", "surface", "total"):
-        raise InputError(f"layer: got {holds!r} as the content of {layer}, wanted airlight, surface or total")
+        raise InputError(f"layer: got {holds!r} as the content of {layer}, expected airlight, surface or total")
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and not Path(str(test)).is_file():
         raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
@@ -166,7 +166,7 @@ def _are_several(test: Any) -> bool:
 def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -> "Said":
     """Compare frames that `frames` tells of, or independent renders."""
     if not isinstance(test, str | os.PathLike):
-        raise InputError("frames: wanted the files of all frames, such as 'frames/####.exr'; save the images first")
+        raise InputError("frames: expected the files of all frames, such as 'frames/####.exr'; save the images first")
     from reports.api.comparisons import frames_comparison
     from reports.machine.environment import activate
     from validation.motion.judge import compare_frames
@@ -192,7 +192,7 @@ def _check_difference(path: Path) -> None:
     from reference.storage.files import ensure_writable
 
     if path.suffix.lower() not in _ENDINGS:
-        raise InputError(f"output: got {str(path)!r}, wanted a name that ends in .exr (values) or .png (a picture)")
+        raise InputError(f"output: got {str(path)!r}, expected a name that ends in .exr (values) or .png (a picture)")
     ensure_writable(path)
 
 
@@ -230,8 +230,8 @@ def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
     values = np.asarray(image)
     if values.dtype.kind not in "fiu":
         raise InputError(
-            f"{name}: got {type(image).__name__}, wanted what render or reference return, a path, or numbers (height, "
-            "width, 3)"
+            f"{name}: got {type(image).__name__}, expected what render or reference return, a path, or numbers "
+            "(height, width, 3)"
         )
     return Image({layer or "airlight": values}), name
 

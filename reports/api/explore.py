@@ -55,7 +55,7 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
     files = [Path(path) for path in several(output)]
     for path in files:
         if path.suffix.lower() not in (".glb", ".vol"):
-            raise InputError(f"output: got {path}, wanted a name that ends in .glb or .vol, such as {path.stem}.glb")
+            raise InputError(f"output: got {path}, expected a name that ends in .glb or .vol, such as {path.stem}.glb")
         ensure_writable(path)
     from reports.machine.environment import activate
 
@@ -97,7 +97,7 @@ def _write_grid(path: Path, scene: Any) -> str:
     medium = read_reference(scene).medium
     if not isinstance(medium, HeightMedium | GridMedium):
         raise InputError(
-            f"output: got {path}, and the medium is no height fog and no grid; wanted a name that ends in .glb"
+            f"output: got {path}, and the medium is no height fog and no grid; expected a name that ends in .glb"
         )
     return write_fog_grid(path, medium)
 
@@ -144,7 +144,7 @@ def view(
     require("websockets", "view", "the live view")
     host, _, digits = address.rpartition(":")
     if not host or not digits.isdecimal() or not (port := int(digits)) <= 65535:
-        raise InputError(f"address: got {address!r}, wanted HOST:PORT, a port from 0, any free one, to 65535")
+        raise InputError(f"address: got {address!r}, expected HOST:PORT, a port from 0, any free one, to 65535")
     from validation.study.configuration import Configuration, configuration
 
     chosen = method if isinstance(method, Configuration) else configuration(method, kernel_name(kernel), parameters)
@@ -161,7 +161,7 @@ def view(
             server = Server(host, port, opened=session.opened, told=session.told, closed=session.closed)
         except OSError as error:
             raise InputError(
-                f"address: cannot listen at {host}, port {port}: {error.strerror}; wanted an address of this "
+                f"address: cannot listen at {host}, port {port}: {error.strerror}; expected an address of this "
                 "machine, and a port that is free: 0 finds one"
             ) from error
         server.start()

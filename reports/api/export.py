@@ -86,7 +86,7 @@ def export(
 
     if phase.startswith(("hg:", "tabulated", "mie")):
         raise InputError(
-            f"phase: got {phase!r}, wanted isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D"
+            f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D"
         )
     files = [Path(path) for path in several(output)]
     for path in files:

@@ -121,7 +121,7 @@ def listed(name: str, words: Any) -> list[str]:
     parts = words.split(",") if isinstance(words, str) else [str(word) for word in words]
     parts = [part.strip() for part in parts]
     if not all(parts):
-        raise InputError(f"{name}: got {words!r}, wanted names with commas between them, none of them empty")
+        raise InputError(f"{name}: got {words!r}, expected names with commas between them, none of them empty")
     return parts
 
 
@@ -136,7 +136,7 @@ def pixels_of(size: Any) -> tuple[int, int] | None:
         if not (int(width) == width and int(height) == height):
             raise ValueError
     except (TypeError, ValueError):
-        raise InputError(f"size: got {size!r}, wanted (width, height) in pixels, for example (800, 600)") from None
+        raise InputError(f"size: got {size!r}, expected (width, height) in pixels, for example (800, 600)") from None
     return int(width), int(height)
 
 
@@ -160,7 +160,7 @@ def kernel_name(kernel: Any) -> str | None:
     module, name = getattr(kernel, "__module__", ""), getattr(kernel, "__qualname__", "")
     if not callable(kernel) or getattr(sys.modules.get(module), name, None) is not kernel:
         raise InputError(
-            f"kernel: got {kernel!r}, wanted a name or a function at the top of a module: give it a name there"
+            f"kernel: got {kernel!r}, expected a name or a function at the top of a module: give it a name there"
         )
     return f"{module}:{name}"
 

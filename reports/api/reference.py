@@ -114,7 +114,7 @@ def reference(
         return _merged(str(scene), files)
     if estimator not in _ESTIMATORS:
         raise InputError(
-            f"estimator: got {estimator!r}, wanted one of {', '.join(_ESTIMATORS)}" + nearest(estimator, _ESTIMATORS)
+            f"estimator: got {estimator!r}, expected one of {', '.join(_ESTIMATORS)}" + nearest(estimator, _ESTIMATORS)
         )
     if orders is not None and estimator not in ("volpath", "cloud-paths"):
         raise InputError(f"orders: {estimator} knows single scattering alone; take cloud-paths or volpath")
@@ -273,5 +273,5 @@ def _budget(given: dict[str, Any], *, usual: int) -> "Budget":
     for name in named:
         kind, words = (int, "a whole number") if name == "samples" else (int | float, "a number")
         if not isinstance(given[name], kind) or not given[name] > 0:
-            raise InputError(f"{name}: got {given[name]!r}, wanted {words} above 0")
+            raise InputError(f"{name}: got {given[name]!r}, expected {words} above 0")
     return Budget(samples=given["samples"] if named else usual, error=given["error"], seconds=given["seconds"])

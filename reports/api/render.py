@@ -153,7 +153,7 @@ def render(
     _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
     for name, number in (("run", run), ("frame", frame)):
         if not 0 <= number < 2**31:
-            raise InputError(f"{name}: got {number}, wanted a whole number from 0 up to, but not, {2**31}")
+            raise InputError(f"{name}: got {number}, expected a whole number from 0 up to, but not, {2**31}")
     from reports.machine.environment import activate
 
     activate()  # a user's module may need a variant when it is imported
@@ -205,7 +205,7 @@ def _check(
 
     for name, value in (("samples", samples), ("frames", frames)):
         if value is not None and value < 1:
-            raise InputError(f"{name}: got {value}, wanted 1 or more")
+            raise InputError(f"{name}: got {value}, expected 1 or more")
     if plan and (files or frames is not None or samples > 1 or timed):
         raise InputError("plan: renders nothing; leave out what is about an image")
     if animate is not None and frames is None:
@@ -213,13 +213,13 @@ def _check(
     if frames is not None and not files:
         raise InputError("frames: got no place for the files; add an output, such as -o NAME.exr or -o NAME.png")
     if frames is not None and samples > 1:
-        raise InputError("samples: got frames too, wanted one of them: animations have one ray a pixel")
+        raise InputError("samples: got frames too, expected one of them: animations have one ray a pixel")
     if frames is not None and timed:
-        raise InputError("timed: got frames too, wanted one of them: an animation says what its frames cost")
+        raise InputError("timed: got frames too, expected one of them: an animation says what its frames cost")
     for path in files:
         if path.suffix.lower() not in _ENDINGS:
             raise InputError(
-                f"output: got {str(path)!r}, wanted a name that ends in .exr (all layers) or .png (a picture)"
+                f"output: got {str(path)!r}, expected a name that ends in .exr (all layers) or .png (a picture)"
             )
         ensure_writable(path if frames is None else _numbered(path, 1, frames))
 

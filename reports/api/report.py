@@ -394,7 +394,7 @@ def paper(
     from validation.papers.claims import claims, papers
 
     if name is not None and name not in papers():
-        raise InputError(f"paper: got {name!r}, wanted one of {', '.join(papers())}" + nearest(name, papers()))
+        raise InputError(f"paper: got {name!r}, expected one of {', '.join(papers())}" + nearest(name, papers()))
     chosen = [claim for claim in claims() if name in (None, claim.paper)]
     activate()
     with telling(progress, "paper") as tell:

@@ -329,7 +329,7 @@ def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, tot
         light = image.layers["airlight"] + image.layers["surface"] if total is None else total
         write_png(path, preview(np.asarray(light, dtype=np.float64), curve or tone_curve(light)))
     else:
-        raise InputError(f"save: got {str(path)!r}, wanted a path that ends with .exr (all layers) or .png (picture)")
+        raise InputError(f"save: got {str(path)!r}, expected a path that ends with .exr (all layers) or .png (picture)")
 
 
 def _written(files: Sequence[str], size: tuple[int, int]) -> list[str]:

@@ -92,7 +92,7 @@ def _from_mitsuba(scene: Any) -> OpenScene:
                 "you build it"
             )
         raise InputError(
-            f"scene: got {kind.__name__}, wanted a name, the path of a Mitsuba XML file, a Mitsuba dictionary of the "
+            f"scene: got {kind.__name__}, expected a name, the path of a Mitsuba XML file, a Mitsuba dictionary of the "
             "type 'scene', or a scene that is loaded"
         )
     if not scene.sensors():

@@ -39,8 +39,8 @@ def parse_place(word: str | None) -> Place:
     if _ADDRESS.fullmatch(word) or Path(word).is_file():
         return word
     raise InputError(
-        f"--cluster: got {word!r}, wanted local, local:N with up to 9999 processes, tcp://HOST:PORT, or the file that "
-        "`dask scheduler --scheduler-file` writes"
+        f"--cluster: got {word!r}, expected local, local:N with up to 9999 processes, tcp://HOST:PORT, or the file "
+        "that `dask scheduler --scheduler-file` writes"
     )
 
 

@@ -25,7 +25,7 @@ def list_(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | N
     """
     kinds = {"scenes": _scenes, "methods": _methods, "kernels": _kernels, "studies": _studies, "papers": _papers}
     if what is not None and what not in kinds:
-        raise InputError(f"list: got {what!r}, wanted one of {', '.join(kinds)}" + nearest(what, kinds))
+        raise InputError(f"list: got {what!r}, expected one of {', '.join(kinds)}" + nearest(what, kinds))
     if what is not None:
         shown = kinds[what]()
         return Said(name=what, data=_data(shown), tables=(shown,))

@@ -167,7 +167,7 @@ def _check_files(files: Sequence[Path], endings: Sequence[str]) -> None:
 
     for path in files:
         if path.suffix.lower() not in endings:
-            raise InputError(f"output: got {str(path)!r}, wanted a name that ends in {', '.join(endings)}")
+            raise InputError(f"output: got {str(path)!r}, expected a name that ends in {', '.join(endings)}")
         ensure_writable(path)
 
 

@@ -20,7 +20,7 @@ def read_report(path: Path | str) -> Report:
     given = data.get("schema") if isinstance(data, dict) else None
     if given != SCHEMA:
         got = f"the schema {given!r}" if given is not None else "no schema"
-        raise InputError(f"{file} has {got}, wanted {SCHEMA!r}; make the report again with this version of airlight")
+        raise InputError(f"{file} has {got}, expected {SCHEMA!r}; make the report again with this version of airlight")
     from msgspec import ValidationError
 
     try:
@@ -51,9 +51,9 @@ def read_json(path: Path, wanted: str) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"), parse_float=_finite, parse_constant=_finite)
     except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}; wanted {wanted}") from error
+        raise InputError(f"cannot read {path}: {error.strerror}; expected {wanted}") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not valid JSON ({error}); wanted {wanted}") from error
+        raise InputError(f"{path} is not valid JSON ({error}); expected {wanted}") from error
 
 
 def _finite(digits: str) -> float | str:

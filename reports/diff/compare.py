@@ -65,7 +65,7 @@ def compare_reports(
     Reports without a common number are refused.
     """
     if time_tolerance is not None and not 0 < time_tolerance < math.inf:
-        raise InputError(f"--time-tolerance: got {time_tolerance:g}, wanted a number above 0, such as 0.1 for 10 %")
+        raise InputError(f"--time-tolerance: got {time_tolerance:g}, expected a number above 0, such as 0.1 for 10 %")
     before, after = ({scene.name: scene for scene in report.scenes} for report in (old, new))
     findings: list[Finding] = []
     compared = 0

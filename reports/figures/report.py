@@ -105,7 +105,7 @@ def _strip(report: Report, place: Path, name: str | None, labels: Sequence[str] 
 def _scene(report: Report, name: str | None) -> Scene:
     scenes = {scene.name: scene for scene in report.scenes if _shown(scene, "airlight") or _shown(scene, "total")}
     if name is not None and name not in scenes:
-        raise InputError(f"scene: got {name!r}, wanted one of {', '.join(scenes)}" + nearest(name, scenes))
+        raise InputError(f"scene: got {name!r}, expected one of {', '.join(scenes)}" + nearest(name, scenes))
     if not scenes:
         raise InputError("the report has no scene with an image of a method: nothing to show")
     shadowed = [scene for scene in scenes.values() if not scene.plan.get("shadows", "none").startswith("none")]
@@ -125,7 +125,7 @@ def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[MethodRow]:
     for label in wanted:
         if label not in known:
             names = "; ".join(known)
-            raise InputError(f"method: got {label!r}, wanted some of {names}" + nearest(label, known))
+            raise InputError(f"method: got {label!r}, expected some of {names}" + nearest(label, known))
     chosen = [known[label] for label in wanted]
     if len({entry.layer for entry in chosen}) > 1:
         raise InputError("method: got images with airlight and images without layers; show them in two figures")

@@ -126,7 +126,7 @@ def _volume(medium: dict[str, Any]) -> dict[str, Any]:
 
 def _material(surface: dict[str, Any]) -> dict[str, Any]:
     if surface["textured"] or not surface["diffuse"]:
-        return {"cannot": "a surface with one colour that is diffuse is wanted"}
+        return {"cannot": "a surface with one colour that is diffuse is needed"}
     return {"inputs": {"Color": [*surface["reflectance"], 1.0], "Roughness": 0.0}, "two_sided": surface["two_sided"]}
 
 

@@ -27,7 +27,7 @@ def fog_grid(medium: HeightMedium) -> Array:
     count = max(2, int(np.ceil(_VOXELS * (medium.cap - medium.floor) / least)))
     if count > _MOST:
         raise InputError(
-            f"the height fog takes {count} voxels, 20 a scale height; wanted at most {_MOST}: lower its cap"
+            f"the height fog takes {count} voxels, 20 a scale height; expected at most {_MOST}: lower its cap"
         )
     step = (medium.cap - medium.floor) / count
     z = medium.floor + step * (np.arange(count) + 0.5)

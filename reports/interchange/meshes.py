@@ -37,7 +37,7 @@ def shape_mesh(shape: Any) -> ShapeMesh:
         return _of_mesh(shape)
     if unit is None:
         raise InputError(
-            f"shape '{shape.id()}' is a {shape.class_name()}; wanted meshes, cubes, rectangles, spheres, disks and "
+            f"shape '{shape.id()}' is a {shape.class_name()}; expected meshes, cubes, rectangles, spheres, disks and "
             "cylinders to write as triangles: replace it by a mesh"
         )
     return _placed(shape, *unit())

@@ -121,7 +121,7 @@ def _camera(sensor: Any, scene: ReferenceScene) -> dict[str, Any]:
 
     matrix = camera_matrix(sensor)
     if not np.allclose(matrix[:3, :3].T @ matrix[:3, :3], np.eye(3), atol=1e-5) or np.linalg.det(matrix[:3, :3]) < 0:
-        raise InputError("the camera's to_world scales, shears or mirrors; wanted a rotation and a translation")
+        raise InputError("the camera's to_world scales, shears or mirrors; expected a rotation and a translation")
     x_fov = _number(float(mi.traverse(sensor)["x_fov"][0]))
     tangent = np.tan(0.5 * np.deg2rad(x_fov))
     return {

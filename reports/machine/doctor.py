@@ -235,7 +235,7 @@ def probe() -> Kernel:
     towards = scene.ray_intersect(mi.Ray3f(mi.Point3f([0, 3], 0, -2), mi.Vector3f(0, 0, 1)))
     distances = towards.t.numpy().tolist()
     if abs(distances[0] - 1.5) > 1e-5 or distances[1] < 1e30:
-        raise MissingError(f"the test kernel is wrong: distances {distances}, wanted 1.5 and infinity")
+        raise MissingError(f"the test kernel is wrong: distances {distances}, expected 1.5 and infinity")
     return Kernel(mi.variant(), dr.thread_count(), _loaded_llvm(), measure_shadow_epsilon())
 
 

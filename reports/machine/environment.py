@@ -134,7 +134,9 @@ def check_variant(variant: str) -> None:
     from analytic.errors import InputError, nearest
 
     if variant not in VARIANTS:
-        raise InputError(f"variant: got {variant!r}, wanted one of {', '.join(VARIANTS)}" + nearest(variant, VARIANTS))
+        raise InputError(
+            f"variant: got {variant!r}, expected one of {', '.join(VARIANTS)}" + nearest(variant, VARIANTS)
+        )
 
 
 def atomic_problem() -> str:

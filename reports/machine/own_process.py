@@ -68,7 +68,7 @@ def in_own_process(
             _end(process)
     if not answer:
         how = _how(process.returncode)
-        raise EndedError(f"{what} {name}: ended its process, {how}; wanted a result or an exception")
+        raise EndedError(f"{what} {name}: ended its process, {how}; expected a result or an exception")
     returned, value, loaded = pickle.loads(answer)
     if not returned:
         raise value

@@ -45,7 +45,7 @@ def is_asked_for() -> bool:
     if value not in ("quick", "full"):
         from analytic.errors import InputError
 
-        raise InputError(f"{VARIABLE}: got {value!r}, wanted quick, or full as without it")
+        raise InputError(f"{VARIABLE}: got {value!r}, expected quick, or full as without it")
     return value == "quick"
 
 

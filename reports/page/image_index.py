@@ -59,7 +59,7 @@ def page_images(scenes: Sequence[Scene], folder: Path, limit: int) -> list[Scene
         if not coarser:
             raise InputError(
                 f"report: the images take {total / 1e6:.1f} MB of the page even with one pixel in {STRIDES[-1]} "
-                f"along both axes, wanted at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
+                f"along both axes, expected at most {limit / 1e6:.1f} MB; report fewer scenes or methods at once"
             )
         largest = max(coarser, key=lambda place: len(packed[place].data))
         stride = STRIDES[STRIDES.index(packed[largest].index["stride"]) + 1]
@@ -77,8 +77,8 @@ def read_images(scene: Scene, folder: Path) -> list[dict[str, Array]]:
         for layer in layers.values():
             if layer.shape != size:
                 raise InputError(
-                    f"{path}: got {layer.shape[1]} x {layer.shape[0]} pixels, wanted the {size[1]} x {size[0]} of the "
-                    "scene's reference; make the report again"
+                    f"{path}: got {layer.shape[1]} x {layer.shape[0]} pixels, expected the {size[1]} x {size[0]} of "
+                    "the scene's reference; make the report again"
                 )
     return [reference, *methods]
 

@@ -66,7 +66,7 @@ def render_page(report: Report, folder: Path, *, limit: int = PAGE_LIMIT) -> str
     )
     if len(page.encode()) > limit:
         raise InputError(
-            f"report: the page takes {len(page.encode()) / 1e6:.1f} MB, wanted at most {limit / 1e6:g} MB; "
+            f"report: the page takes {len(page.encode()) / 1e6:.1f} MB, expected at most {limit / 1e6:g} MB; "
             "report fewer scenes or methods at once"
         )
     return page
@@ -128,7 +128,7 @@ def _inline(path: Path) -> str:
             picture.convert("RGB").save(buffer, "WEBP", quality=80)
     except OSError as error:
         raise InputError(
-            f"{path} is no picture that can be read ({error}); wanted the PNG of a report: measure again"
+            f"{path} is no picture that can be read ({error}); expected the PNG of a report: measure again"
         ) from None
     return f"data:image/webp;base64,{base64.b64encode(buffer.getvalue()).decode()}"
 

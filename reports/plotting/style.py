@@ -114,7 +114,7 @@ def figure_style(column: str = "double") -> Iterator[float]:
     import matplotlib.style
 
     if column not in WIDTHS:
-        raise InputError(f"column: got {column!r}, wanted one of {', '.join(WIDTHS)}")
+        raise InputError(f"column: got {column!r}, expected one of {', '.join(WIDTHS)}")
     sheets = [str(_SHEETS / "airlight.mplstyle"), str(_SHEETS / f"{column}.mplstyle")]
     with matplotlib.style.context(sheets, after_reset=True):
         yield WIDTHS[column]

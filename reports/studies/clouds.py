@@ -93,7 +93,7 @@ def slab(
     from validation.study.cost import forced
 
     if photons != int(photons) or photons == 1 or photons < 0:
-        raise InputError(f"photons: got {photons}, wanted a whole number from 2 on, for example 1000000")
+        raise InputError(f"photons: got {photons}, expected a whole number from 2 on, for example 1000000")
     chosen = orders if isinstance(orders, str) else several(orders)
     request = slab_request(
         tau, sun, phase=os.fspath(phase), albedo=albedo, orders=chosen, depths=depths, directions=directions

@@ -61,7 +61,7 @@ def scaling(
     wanted = usual.growth if kinds is None else listed("kinds", kinds)
     for kind in wanted:
         if kind not in GROWTH:
-            raise InputError(f"kinds: got {kind!r}, wanted some of {','.join(GROWTH)}")
+            raise InputError(f"kinds: got {kind!r}, expected some of {','.join(GROWTH)}")
     chosen, _ = asked_configurations(method, (), (), usual=usual.configurations)
     study = replace(usual.at(pixels_of(size)), configurations=tuple(chosen))
     names = [str(name) for name in several(scenes)] or usual.scenes

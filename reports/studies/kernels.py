@@ -286,7 +286,7 @@ def _cases(cases: Any) -> "tuple[Cases, tuple[int, ...]]":
     if isinstance(cases, Cases):
         return cases, (len(cases.x0),)
     if not isinstance(cases, Mapping) and not hasattr(cases, "keys"):
-        raise InputError(f"cases: got {type(cases).__name__}, wanted columns by name or the path of a CSV file")
+        raise InputError(f"cases: got {type(cases).__name__}, expected columns by name or the path of a CSV file")
     return cases_from_columns({str(name): cases[name] for name in cases})
 
 

@@ -87,7 +87,7 @@ class Study(Said):
         elif target.suffix == ".json":
             write_text(target, json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
         else:
-            raise InputError(f"output: got {str(path)!r}, wanted a name that ends in {', '.join(ENDINGS)}")
+            raise InputError(f"output: got {str(path)!r}, expected a name that ends in {', '.join(ENDINGS)}")
         return target
 
 
@@ -131,7 +131,7 @@ def find_study(name: str) -> Callable[..., Any]:
         For an unknown study; the nearest is named.
     """
     if name not in STUDIES:
-        raise InputError(f"study: got {name!r}, wanted one of {', '.join(STUDIES)}" + nearest(name, STUDIES))
+        raise InputError(f"study: got {name!r}, expected one of {', '.join(STUDIES)}" + nearest(name, STUDIES))
     function: Callable[..., Any] = getattr(
         importlib.import_module(f"reports.studies.{STUDIES[name]}"), name.replace("-", "_")
     )

@@ -91,7 +91,7 @@ def read_sweep(path: Path | str) -> Sweep:
         missing = [name for name in _NEEDED if name not in names]
         if missing:
             raise InputError(
-                f"{file} has no column {missing[0]!r}, wanted the columns of a sweep of this version of airlight; "
+                f"{file} has no column {missing[0]!r}, expected the columns of a sweep of this version of airlight; "
                 "run the sweep again: what its rows hold is kept"
             )
         known = {column.key for column in COLUMNS}
@@ -102,7 +102,7 @@ def read_sweep(path: Path | str) -> Sweep:
         raise InputError(f"{file} has no rows: no cell of the sweep has ended; run it to its end, or for longer")
     unknown = sorted(set(columns["status"]) - set(STATUSES))
     if unknown:
-        raise InputError(f"{file} has the status {unknown[0]!r}, wanted one of {', '.join(STATUSES)}; run it again")
+        raise InputError(f"{file} has the status {unknown[0]!r}, expected one of {', '.join(STATUSES)}; run it again")
     kept = _current(columns)
     order = {row: tuple(natural(columns[name][row] or "") for name in _ORDER) for row in kept}
     kept.sort(key=order.__getitem__)
@@ -159,7 +159,9 @@ def _file_of(path: Path) -> Path:
     """Return the Parquet that a path names."""
     file = path / FILE if path.is_dir() else path
     if not file.is_file():
-        raise InputError(f"{file} is not there; wanted the folder of a sweep, `airlight sweep -o DIR`, or its Parquet")
+        raise InputError(
+            f"{file} is not there; expected the folder of a sweep, `airlight sweep -o DIR`, or its Parquet"
+        )
     return file
 
 

@@ -244,9 +244,9 @@ class Session:
         own = self._given.chosen
         if method not in METHODS and method != own.method:
             wanted = ", ".join([*METHODS, *([own.method] if own.method not in METHODS else [])])
-            raise InputError(f"method: got {method!r}, wanted one of {wanted}" + nearest(method, METHODS))
+            raise InputError(f"method: got {method!r}, expected one of {wanted}" + nearest(method, METHODS))
         if kernel and ":" in str(kernel) and kernel != own.kernel:
-            raise InputError(f"kernel: got {kernel!r}, wanted one that is built in, or that of the command line")
+            raise InputError(f"kernel: got {kernel!r}, expected one that is built in, or that of the command line")
 
     # Messages to the page ---------------------------------------------------------------------------------------------
 

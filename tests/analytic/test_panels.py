@@ -152,10 +152,10 @@ def test_corners():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"foot": np.nan}, "foot of row 0 is nan; wanted a finite number"),
-        ({"height": [1.0, -1.0]}, "height of row 1 is -1.0; wanted a number >= 0"),
+        ({"foot": np.nan}, "foot of row 0 is nan; expected a finite number"),
+        ({"height": [1.0, -1.0]}, "height of row 1 is -1.0; expected a number >= 0"),
         ({"foot": [1.0, 2.0], "height": [1.0, 2.0, 3.0]}, "do not fit together"),
-        ({"shadow_scale": 1.5}, "shadow_scale is 1.5; wanted a number from 0 to 1"),
+        ({"shadow_scale": 1.5}, "shadow_scale is 1.5; expected a number from 0 to 1"),
         ({"rtol": 1e-16}, "rtol is 1e-16"),
     ],
 )

@@ -115,7 +115,7 @@ def test_forward_is_forward_in_mitsuba_too(scalar_mitsuba, plugin, phase):
     ("arguments", "message"),
     [
         ({"name": "haze"}, "did you mean 'hazy'"),
-        ({"name": "hg", "g": 1.0}, "g is 1.0; wanted a number between -1 and 1"),
+        ({"name": "hg", "g": 1.0}, "g is 1.0; expected a number between -1 and 1"),
         ({"name": "murky", "g": 0.2}, "which has none"),
         ({"name": "hazy", "table": [1, 1]}, "for no other"),
         ({"name": "tabulated", "table": [1.0, -0.1]}, "value 1 .* is -0.1"),

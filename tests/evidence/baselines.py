@@ -178,7 +178,7 @@ def main() -> int:
     parser.add_argument("--because", default="", help="why numbers moved; --update needs it")
     asked = parser.parse_args()
     if unknown := set(asked.scenes) - set(SCATTER_ONCE):
-        parser.error(f"no built-in scene of fog: {', '.join(sorted(unknown))}; wanted: {', '.join(SCATTER_ONCE)}")
+        parser.error(f"no built-in scene of fog: {', '.join(sorted(unknown))}; expected: {', '.join(SCATTER_ONCE)}")
     if asked.update and not asked.because.strip():
         parser.error("--update needs --because")
     from reports.machine.environment import activate

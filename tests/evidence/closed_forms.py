@@ -63,7 +63,7 @@ def sphere_airlight(sigma_t: float, height: float, radius: float, *, foot: float
     Valid for isotropic scattering, to 1e-12, where sigma_t times the panels' width is below 10.
     """
     if not height > radius > 0:
-        raise InputError(f"height is {height} and radius {radius}; wanted a ray that passes beside the sphere")
+        raise InputError(f"height is {height} and radius {radius}; expected a ray that passes beside the sphere")
     # In w = asinh((x - foot)/(height - radius)) the peak beside the sphere is as wide as everything else.
     scale = height - radius
     ends = np.arcsinh((x0 - foot) / scale), np.arcsinh((x1 - foot) / scale)

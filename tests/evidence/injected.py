@@ -111,7 +111,7 @@ def rewritten(change: Rewrite) -> list[tuple[FunctionType, Any]]:
                 places += replacer.count
                 found.append((_function(owner, definition.name), _code(module, changed)))
     if places != change.times:
-        raise LookupError(f"{change.where} holds {change.old!r} {places} times; wanted {change.times}")
+        raise LookupError(f"{change.where} holds {change.old!r} {places} times; expected {change.times}")
     return found
 
 

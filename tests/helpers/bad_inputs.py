@@ -5,7 +5,7 @@
 
 prints what is wrong. Each input has a process of its own, which does all that users do with a
 scene. A process that ends by a signal, a traceback, and anything that is not finite in a file or in JSON that was
-written with status 0 are faults; so is a refusal without a word on what is wanted.
+written with status 0 are faults; so is a refusal without a word on what is expected.
 """
 
 import contextlib
@@ -285,9 +285,10 @@ def _fault(order: list[str]) -> str:
         if written is not None and not _finite_file(written):
             return f"{written.name} is not finite"
     elif status == 2 and not any(
-        word in said for word in ("wanted", "move", "give", "use ", "reference ", "cannot", "finite", "repair")
+        word in said
+        for word in ("expected", "needs", "move", "give", "use ", "reference ", "cannot", "finite", "repair")
     ):
-        return f"says nothing of what is wanted: {said}"
+        return f"says nothing of what is expected: {said}"
     elif status not in (1, 2):
         return f"status {status}: {said}"
     return ""

@@ -97,7 +97,7 @@ def rows(scenes=60, seed=3, methods=METHODS):
             changes |= {"frame_ms": milliseconds, "frame_ms_low": 0.97 * milliseconds}
             changes |= {"frame_ms_high": 1.05 * milliseconds}
             if method == "light-volumes" and lights > 6:
-                changes |= {"status": "refused", "reason": f"random:{number} has {lights} lights, wanted at most 6"}
+                changes |= {"status": "refused", "reason": f"random:{number} has {lights} lights, expected at most 6"}
             made.append(row(f"random:{number}", method, kernel, parameters, **changes, **properties))
     return made
 

@@ -22,7 +22,7 @@ class Fog(Parameters):
 
     def _check_together(self):
         if self.on and self.free < 0:
-            raise InputError("free: wanted on=false with a value below 0")
+            raise InputError("free: expected on=false with a value below 0")
 
 
 def refused(words):
@@ -32,17 +32,17 @@ def refused(words):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"steps": -1}, "steps: got -1, wanted a whole number from 1 to 64"),
-        ({"fraction": 0.0}, "fraction: got 0.0, wanted a finite number above 0 up to, but not, 1 [1/m]"),
-        ({"fraction": float("nan")}, "fraction: got nan, wanted"),
-        ({"word": "unevn"}, "word: got 'unevn', wanted one of even, uneven; did you mean 'uneven'?"),
-        ({"free": -1.0}, "free: wanted on=false with a value below 0"),
+        ({"steps": -1}, "steps: got -1, expected a whole number from 1 to 64"),
+        ({"fraction": 0.0}, "fraction: got 0.0, expected a finite number above 0 up to, but not, 1 [1/m]"),
+        ({"fraction": float("nan")}, "fraction: got nan, expected"),
+        ({"word": "unevn"}, "word: got 'unevn', expected one of even, uneven; did you mean 'uneven'?"),
+        ({"free": -1.0}, "free: expected on=false with a value below 0"),
         (
             {"step": 3},
-            "method fog: got a parameter 'step', wanted one of: steps, fraction, word, on, free; did you mean",
+            "method fog: got a parameter 'step', expected one of: steps, fraction, word, on, free; did you mean",
         ),
-        ({"steps": "1.5"}, "method fog: steps got '1.5', wanted a whole number"),
-        ({"on": "maybe"}, "method fog: on got 'maybe', wanted true or false"),
+        ({"steps": "1.5"}, "method fog: steps got '1.5', expected a whole number"),
+        ({"on": "maybe"}, "method fog: on got 'maybe', expected true or false"),
     ],
 )
 def test_what_cannot_be_used_is_refused_with_what_is_wanted(given, words):

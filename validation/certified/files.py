@@ -35,5 +35,5 @@ def certified_data(name: str = "certified_fog.json") -> Path:
     ['thin-open', 'near-light']
     """
     if name not in FILES:
-        raise InputError(f"certified data: got {name!r}, wanted one of {', '.join(FILES)}{nearest(name, FILES)}")
+        raise InputError(f"certified data: got {name!r}, expected one of {', '.join(FILES)}{nearest(name, FILES)}")
     return FOLDER / name

@@ -155,7 +155,7 @@ def read_mask(path: str | os.PathLike[str]) -> Bools:
     """Return where the plain channels of an EXR file are not zero: truth values [1], (height, width)."""
     values = np.asarray(image_layer(read_exr(path), TOTAL, path))
     if not np.isfinite(values).all():
-        raise InputError(f"{path} as a mask has values that are not finite; wanted 0 for out and 1 for in")
+        raise InputError(f"{path} as a mask has values that are not finite; expected 0 for out and 1 for in")
     return (values != 0).any(axis=2)
 
 
@@ -164,7 +164,9 @@ def _estimate(path: str, image: Image, name: str) -> Estimate:
     error = image.layers.get(f"{name}_se")
     batches = image.attributes.get(BATCHES) if error is not None else None
     if batches is not None and not isinstance(batches, int):
-        raise InputError(f"{path} has the attribute {BATCHES} {batches!r}; wanted an integer; correct it or remove it")
+        raise InputError(
+            f"{path} has the attribute {BATCHES} {batches!r}; expected an integer; correct it or remove it"
+        )
     return Estimate(image_layer(image, name, path), error, batches)
 
 

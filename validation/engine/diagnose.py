@@ -154,8 +154,8 @@ def diagnose_image(
     seen, wrong = seen_image(image, judged, loaded.scene)
     if (count := int(seen.used.sum())) < _FEWEST:
         raise InputError(
-            f"{path}: {count} pixels of the layer '{judged.name}' say something; wanted at least {_FEWEST}, finite and "
-            "not of a light itself: fewer do not tell a fault from noise"
+            f"{path}: {count} pixels of the layer '{judged.name}' say something; expected at least {_FEWEST}, finite "
+            "and not of a light itself: fewer do not tell a fault from noise"
         )
     light = light or SceneLight(seen.reference)
     shape = judged.size[1], judged.size[0]

@@ -44,10 +44,12 @@ def find_images(folder: str | os.PathLike[str], scenes: Mapping[str, str]) -> di
     """
     place = Path(folder)
     if not place.is_dir():
-        raise InputError(f"--images: got {folder}, wanted a folder with EXR files named by scene, such as open-fog.exr")
+        raise InputError(
+            f"--images: got {folder}, expected a folder with EXR files named by scene, such as open-fog.exr"
+        )
     files = sorted(path for path in place.iterdir() if path.suffix.lower() == ".exr" and not path.name.startswith("."))
     if not files:
-        raise InputError(f"--images: the folder {folder} has no EXR file; wanted SCENE.exr or SCENE.NAME.exr in it")
+        raise InputError(f"--images: the folder {folder} has no EXR file; expected SCENE.exr or SCENE.NAME.exr in it")
     by_scene: dict[str, tuple[EngineImage, ...]] = {}
     for path in files:
         scene = _scene_of(path, scenes)
@@ -116,7 +118,7 @@ def image_times(path: Path) -> tuple[Timing, str] | None:
             raise ValueError("ms")
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(
-            f'{file}: wanted {{"{path.name}": {{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}}}}, '
+            f'{file}: expected {{"{path.name}": {{"ms": 3.1, "quartiles": [2.9, 3.4], "device": "RTX 4090"}}}}, '
             "milliseconds of a frame above 0, the median between its quartiles"
         ) from error
     return times, str(entry.get("device", ""))
@@ -129,6 +131,6 @@ def _scene_of(path: Path, scenes: Mapping[str, str]) -> str:
     if names:
         return max(names, key=len)
     raise InputError(
-        f"--images: {path} names no scene, wanted SCENE.exr or SCENE.NAME.exr with one of {', '.join(scenes)}"
+        f"--images: {path} names no scene, expected SCENE.exr or SCENE.NAME.exr with one of {', '.join(scenes)}"
         + nearest(stem.split(".")[0], scenes)
     )

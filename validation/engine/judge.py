@@ -183,7 +183,7 @@ def judge_image(
     `metrics`: more for `validation.comparison.images.compare_images`.
     """
     if margin is not None and not 0 < margin < math.inf:
-        raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
+        raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
     kinds = pixel_kinds(image, pixel)
     if mask is not None and np.shape(mask) == judged.values.shape[:2]:
         judged = replace(judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan))

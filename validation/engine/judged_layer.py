@@ -46,7 +46,7 @@ def judged_layer(
     all light.
     """
     if holds is not None and holds not in KINDS:
-        raise InputError(f"holds {holds}; wanted one of {', '.join(KINDS)}")
+        raise InputError(f"holds {holds}; expected one of {', '.join(KINDS)}")
     chosen = _usual(image, path) if name is None else name or TOTAL
     values = layer(image, chosen, path)
     emitted = "emitted" not in image.layers and "airlight:scene" not in image.attributes

@@ -116,18 +116,18 @@ def seen_image(
     if mask is not None and np.shape(mask) != judged.values.shape[:2]:
         shape = " x ".join(str(side) for side in np.shape(mask)[::-1])
         raise InputError(
-            f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; wanted one of the image's size"
+            f"the mask is {shape} pixels, the image {judged.size[0]} x {judged.size[1]}; give one of the image's size"
         )
     reference = read_reference(scene)
     if isinstance(reference.medium, GridMedium):
         raise InputError(
-            "the medium is a density grid, whose images fits and diagnoses do not predict; wanted homogeneous media or "
-            "height fog: compare with the reference alone, without --fit and --diagnose"
+            "the medium is a density grid, whose images fits and diagnoses do not predict; expected homogeneous media "
+            "or height fog: compare with the reference alone, without --fit and --diagnose"
         )
     if reference.sky is not None:
         raise InputError(
-            f"light '{reference.background.id()}' is a sky, whose light fits and diagnoses do not know; wanted lights "
-            "of type 'point', 'spot', 'directional' or 'area'"
+            f"light '{reference.background.id()}' is a sky, whose light fits and diagnoses do not know; expected "
+            "lights of type 'point', 'spot', 'directional' or 'area'"
         )
     values = np.asarray(judged.values, dtype=np.float64)
     values = np.broadcast_to(values.reshape(-1, values.shape[-1]), (judged.size[0] * judged.size[1], 3)).copy()
@@ -158,7 +158,7 @@ def layers_of(image: Image, path: str, name: str | None, holds: str | None) -> t
 def pixel_kinds(image: Image, pixel: str | None) -> tuple[str, ...]:
     """Return the possible kinds of an image's pixels: as given, as an image of ours says, or both."""
     if pixel is not None and pixel not in PIXELS:
-        raise InputError(f"pixel: got {pixel}, wanted 'centre' or 'area'")
+        raise InputError(f"pixel: got {pixel}, expected 'centre' or 'area'")
     said = pixel or image.attributes.get("airlight:pixel")
     if said in PIXELS:
         return (str(said),)

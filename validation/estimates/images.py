@@ -63,9 +63,9 @@ class Budget:
             raise InputError(f"got {' and '.join(named) or 'none'} of {', '.join(given)}; give one of them")
         for name, value in given.items():
             if value is not None and not 0 < value < np.inf:
-                raise InputError(f"{name}: got {value:g}, wanted a positive number")
+                raise InputError(f"{name}: got {value:g}, expected a positive number")
         if self.error is not None and self.error >= 1:
-            raise InputError(f"--error: got {self.error:g}, wanted less than 1; 0.01 is 1 %")
+            raise InputError(f"--error: got {self.error:g}, expected less than 1; 0.01 is 1 %")
 
 
 def whole_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: str = "centre") -> Image:
@@ -160,7 +160,7 @@ def cloud_orders(words: str) -> tuple[str, ...]:
     for (_, last), (first, _) in pairwise(ranges):
         if first <= last:
             raise InputError(
-                f"--orders: got {words!r}, which names order {first} twice; wanted disjoint sets of orders"
+                f"--orders: got {words!r}, which names order {first} twice; expected disjoint sets of orders"
             )
     return names
 

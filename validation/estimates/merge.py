@@ -47,7 +47,7 @@ def merged_references(files: Sequence[tuple[str, Image]]) -> Image:
     order does not matter; those that were not made alike, or share a seed, are refused.
     """
     if len(files) < 2:
-        raise InputError(f"got {len(files)} file to merge; wanted at least two")
+        raise InputError(f"got {len(files)} file to merge; expected at least two")
     parts = sorted((_read(name, image) for name, image in files), key=lambda part: part.seeds)
     for part in parts[1:]:
         _check_same(parts[0], part)

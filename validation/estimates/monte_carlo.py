@@ -85,15 +85,15 @@ def monte_carlo_batches(
     these do not bring is traced here.
     """
     if batches < 2:
-        raise ValueError(f"batches: got {batches}, wanted at least 2 for a standard error")
+        raise ValueError(f"batches: got {batches}, expected at least 2 for a standard error")
     if batches > LARGEST_SEED:
         raise InputError(
-            f"samples: got {batches * samples} a pixel, in {batches} batches of {samples}; wanted at most "
+            f"samples: got {batches * samples} a pixel, in {batches} batches of {samples}; expected at most "
             f"{LARGEST_SEED * samples}: each batch has a seed of its own"
         )
     if not 0 <= first_seed <= LARGEST_SEED - batches:
         raise InputError(
-            f"seed: got {first_seed} for {batches} batches, which count up; wanted 0 to {LARGEST_SEED - batches}"
+            f"seed: got {first_seed} for {batches} batches, which count up; expected 0 to {LARGEST_SEED - batches}"
         )
     settings = {"samples": samples, "max_depth": max_depth, "orders": orders, "counts": counts}
     function = {"single-scatter": single_scatter_batch, "cloud-paths": cloud_paths_batch}.get(estimator, volpath_batch)
@@ -172,7 +172,7 @@ def batch_tracer(
             seen = seen_clouds(clouds).meets
             return layers, lambda seed: cloud_paths_batch(clouds, seed, samples, sets=sets, seen=seen)
     given = f"estimator: got {estimator!r} with max_depth {max_depth} and orders {orders}"
-    raise ValueError(f"{given}, wanted one of {', '.join(ESTIMATORS)}")
+    raise ValueError(f"{given}, expected one of {', '.join(ESTIMATORS)}")
 
 
 def _has(folder: str, seed: int) -> bool:

@@ -117,7 +117,7 @@ def transmittance_errors(
     """
     medium = reference.medium
     if not isinstance(medium, GridMedium):
-        raise InputError("transmittance: the scene has no density grid around its camera; wanted one, such as smoke")
+        raise InputError("transmittance: the scene has no density grid around its camera; expected one, such as smoke")
     random = np.random.default_rng(1)
     begin, end = medium.low + random.random((2, _RAYS, 3)) * (medium.high - medium.low)
     length = np.linalg.norm(end - begin, axis=1)

@@ -138,7 +138,7 @@ def fit_image(
     fewest = max(_FEWEST, 4 * len(unknowns))
     if int(seen.used.sum()) < fewest:
         raise InputError(
-            f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; wanted at least "
+            f"{path}: {int(seen.used.sum())} pixels of the layer '{judged.name}' say something; expected at least "
             f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )
 

@@ -136,7 +136,7 @@ def read_unknowns(
     by default.
     """
     if not names:
-        raise InputError(f"fit: got none, wanted some of {', '.join(NAMES)}")
+        raise InputError(f"fit: got none, expected some of {', '.join(NAMES)}")
     unknowns = tuple(unknown for name in names for unknown in _read(name, reference, fog))
     seen: set[Path] = set()
     for unknown in unknowns:
@@ -147,7 +147,7 @@ def read_unknowns(
         if name not in {unknown.name for unknown in unknowns}:
             known = [unknown.name for unknown in unknowns]
             raise InputError(
-                f"start: '{name}' is not looked for; wanted one of {', '.join(known)}" + nearest(name, known)
+                f"start: '{name}' is not looked for; expected one of {', '.join(known)}" + nearest(name, known)
             )
     return tuple(_started(unknown, starts) for unknown in unknowns)
 
@@ -168,7 +168,7 @@ def _read(name: str, reference: ReferenceScene, fog: Fog) -> list[Unknown]:
         raise InputError(f"fit: got '{name}'; the scene has no height fog: write it as such, or look for 'sigma_t'")
     names = NAMES if fog.height is None else (*_layers_of(fog.height), *NAMES[1:])
     if kind not in names:
-        raise InputError(f"fit: got '{name}', wanted some of {', '.join(names)}" + nearest(word, names))
+        raise InputError(f"fit: got '{name}', expected some of {', '.join(names)}" + nearest(word, names))
     if kind in LAYERS:
         part, number = kind.split("_")
         path: Path = ("height", "layers", int(number) - 1, _PARTS[part]) if number != "0" else ("height", "constant")
@@ -212,7 +212,7 @@ def _of_light(kind: str, number: int, reference: ReferenceScene) -> Unknown:
     if kind == "intensity":
         return Unknown(name, kind, ((kind, number),), 1.0)
     if number >= len(reference.lights):
-        raise InputError(f"fit: got '{name}', wanted the position of a point or spot light")
+        raise InputError(f"fit: got '{name}', expected the position of a point or spot light")
     axis = AXES.index(kind[-1])
     return Unknown(name, kind, (("moved", number, axis),), float(reference.lights[number].position[axis]))
 
@@ -259,7 +259,7 @@ def _chosen(name: str, place: str, numbers: list[int], names: list[str], what: s
     if place.isdigit() and 1 <= int(place) <= len(numbers):
         return [numbers[int(place) - 1]]
     raise InputError(
-        f"fit: got '{name}', wanted a {what} of the scene, {', '.join(names)}, or its number" + nearest(place, names)
+        f"fit: got '{name}', expected a {what} of the scene, {', '.join(names)}, or its number" + nearest(place, names)
     )
 
 
@@ -277,5 +277,5 @@ def _started(unknown: Unknown, starts: Mapping[str, float]) -> Unknown:
     if unknown.scale == "tanh":
         fits, wanted = -1 < value < 1, "a number between -1 and 1"
     if not fits:
-        raise InputError(f"start: {unknown.name}={value:g}, wanted {wanted}")
+        raise InputError(f"start: {unknown.name}={value:g}, expected {wanted}")
     return replace(unknown, start=float(value), place=unknown.scene)

@@ -66,7 +66,7 @@ def read_cases(path: str | Path) -> Cases:
     """
     (_, header), *lines = read_csv(Path(path)) or [(1, [])]
     if not lines:
-        raise InputError(f"{path} has {'a header only' if header else 'no lines'}; wanted a header and cases")
+        raise InputError(f"{path} has {'a header only' if header else 'no lines'}; expected a header and cases")
     columns = dict(zip(header, zip(*(cells for _, cells in lines), strict=True), strict=True))
     return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)))
 
@@ -193,8 +193,8 @@ class _Table:
             )
         wanted = {key: word for word, key in _NAMES.items()}.get(missing[0], missing[0])
         raise InputError(
-            f"{self.name}: no column '{wanted}'; got {known}; wanted phase, x0, x1, sigma_t and either foot and height "
-            "or origin, direction and light"
+            f"{self.name}: no column '{wanted}'; got {known}; expected phase, x0, x1, sigma_t and either foot and "
+            "height or origin, direction and light"
         )
 
     def cells(self, name: str) -> list[str]:
@@ -227,7 +227,7 @@ class _Table:
         """
         if not fine.all():
             row = int(np.argmin(fine))
-            raise InputError(f"{self.where(row, name)}: {self.cells(name)[row]} is out of range; wanted {wanted}")
+            raise InputError(f"{self.where(row, name)}: {self.cells(name)[row]} is out of range; expected {wanted}")
 
 
 def _is_number(cell: str) -> bool:
@@ -241,5 +241,5 @@ def _is_number(cell: str) -> bool:
 def _coordinates(key: str, values: Any, name: str) -> dict[str, Array]:
     vectors = np.asarray(values)
     if vectors.ndim == 0 or vectors.shape[-1] != 3:
-        raise InputError(f"{name}, column '{key}': got an array of shape {vectors.shape}, wanted (..., 3)")
+        raise InputError(f"{name}, column '{key}': got an array of shape {vectors.shape}, expected (..., 3)")
     return {letter: vectors[..., number] for number, letter in enumerate(_VECTORS[key])}

@@ -110,7 +110,7 @@ def integrate_cases(cases: Cases, kernel: str, precision: str) -> Array:
         if large.any():
             row = int(np.argmax(large))
             raise InputError(
-                f"{cases.place(row)}: {name} is {values[row]:g}; wanted at most {LARGEST[precision]:g} in "
+                f"{cases.place(row)}: {name} is {values[row]:g}; expected at most {LARGEST[precision]:g} in "
                 f"{precision} precision: use other units"
             )
     return evaluate_cases(cases, function, precision)

@@ -104,7 +104,7 @@ def _reference(cases: Cases) -> Array:
 
 def _sobol(count: int, dimensions: int) -> Array:
     if not 1 <= count <= _LARGEST_SOBOL:
-        raise ValueError(f"count: got {count}, wanted 1 to {_LARGEST_SOBOL} rays")
+        raise ValueError(f"count: got {count}, expected 1 to {_LARGEST_SOBOL} rays")
     exponent = max(1, int(np.ceil(np.log2(count))))  # a power of two keeps the points balanced
     return qmc.Sobol(dimensions, rng=np.random.default_rng(_SEED)).random_base2(exponent)[:count]
 

@@ -63,7 +63,7 @@ def colour_difference(
     stops, that of `auto_exposure` by default; the mask, (height, width) of truth values, says which pixels to compare.
     """
     if exposure is not None and not np.isfinite(exposure):
-        raise InputError(f"exposure: got {exposure}, wanted a number of stops such as -2, or none to choose it")
+        raise InputError(f"exposure: got {exposure}, expected a number of stops such as -2, or none to choose it")
     ref, tst, chosen = compared(reference, test, mask)
     ref, tst = colours(ref), colours(tst)
     finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)

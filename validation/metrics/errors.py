@@ -112,10 +112,12 @@ def compared(reference: ArrayLike, test: ArrayLike, mask: ArrayLike | None) -> t
             f"images of two sizes: the reference is {_size(ref)}, the test {_size(tst)}; render both at one size"
         )
     if ref.ndim not in (2, 3) or ref.size == 0:
-        raise InputError(f"images of shape {ref.shape}; wanted (height, width) or (height, width, channels), not empty")
+        raise InputError(
+            f"images of shape {ref.shape}; expected (height, width) or (height, width, channels), not empty"
+        )
     chosen = np.ones(ref.shape[:2], dtype=bool) if mask is None else np.asarray(mask)
     if chosen.dtype != np.bool_ or chosen.shape != ref.shape[:2]:
-        raise InputError(f"a mask of {chosen.dtype} {chosen.shape}; wanted truth values (bool) {ref.shape[:2]}")
+        raise InputError(f"a mask of {chosen.dtype} {chosen.shape}; expected truth values (bool) {ref.shape[:2]}")
     if not chosen.any():
         raise InputError("the mask leaves no pixel to compare; choose at least one")
     return ref.reshape(*ref.shape[:2], -1), tst.reshape(*tst.shape[:2], -1), chosen
@@ -136,7 +138,7 @@ def colours(image: Array) -> Array:
     """Return an image, (height, width, channels), with three channels; one becomes grey, other numbers are refused."""
     if image.shape[2] not in (1, 3):
         raise InputError(
-            f"an image of {image.shape[2]} channels has no colour; wanted one (grey) or three (linear RGB)"
+            f"an image of {image.shape[2]} channels has no colour; expected one (grey) or three (linear RGB)"
         )
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
 

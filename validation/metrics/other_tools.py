@@ -88,7 +88,7 @@ def published_errors(
     make zero is not known. Nor are, if the reference is black, `relative`, `dark_max` and `psnr`.
     """
     if unit is not None and not 0 < unit < np.inf:
-        raise InputError(f"unit: got {unit}, wanted a radiance above 0, or none for the mean of the reference")
+        raise InputError(f"unit: got {unit}, expected a radiance above 0, or none for the mean of the reference")
     ref, tst, chosen = compared(reference, test, mask)
     finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
     r, t = ref[finite].ravel(), tst[finite].ravel()

@@ -76,11 +76,11 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read as JSON: {reason}; see docs/your-engine.md for an example") from error
     if not isinstance(given, dict) or given.pop("schema", SCHEMA) != SCHEMA:
-        raise InputError(f'{path}: wanted an object with "schema": "{SCHEMA}"')
+        raise InputError(f'{path}: expected an object with "schema": "{SCHEMA}"')
     for name in given.keys() - _KINDS.keys():
-        raise InputError(f"{path}: got {name!r}, wanted some of {', '.join(_KINDS)}{nearest(name, _KINDS)}")
+        raise InputError(f"{path}: got {name!r}, expected some of {', '.join(_KINDS)}{nearest(name, _KINDS)}")
     if "frames" not in given:
-        raise InputError(f'{path}: the number of frames is missing; wanted such as "frames": 60')
+        raise InputError(f'{path}: the number of frames is missing; expected such as "frames": 60')
     read = {name: _KINDS[name](f"{path}: {name}", value) for name, value in given.items() if value is not None}
     record = FramesRecord(**read)
     lists: dict[str, Any] = {**record.changes, **record.objects}
@@ -88,10 +88,12 @@ def read_frames(path: str | os.PathLike[str]) -> FramesRecord:
     lists |= {"jitter": record.jitter} if record.jitter is not None else {}
     for name, values in lists.items():
         if len(values) != record.frames:
-            raise InputError(f"{path}: {name} has {len(values)} values, wanted one for each of {record.frames} frames")
+            raise InputError(
+                f"{path}: {name} has {len(values)} values, expected one for each of {record.frames} frames"
+            )
     for reset in record.resets:
         if not 0 <= reset < record.frames:
-            raise InputError(f"{path}: resets has {reset}, wanted frames from 0 to {record.frames - 1}")
+            raise InputError(f"{path}: resets has {reset}, expected frames from 0 to {record.frames - 1}")
     return record
 
 
@@ -105,7 +107,7 @@ def frame_paths(pattern: str | os.PathLike[str], record: FramesRecord, about: st
     start, digits = text.find(_MARK), text.count(_MARK)
     if not digits or _MARK * digits not in text:
         raise InputError(
-            f"frames: got {text}, wanted the files of all frames with # for each digit, such as frames/####.exr"
+            f"frames: got {text}, expected the files of all frames with # for each digit, such as frames/####.exr"
         )
     paths = []
     for frame in range(record.frames):
@@ -134,7 +136,7 @@ def _values(what: str, value: Any) -> tuple[float, ...]:
 def _offset(what: str, value: Any) -> tuple[float, ...]:
     found = _by_frame(_number)(what, value)
     if len(found) != 2 or max(map(abs, found)) > _FARTHEST:
-        raise InputError(f"{what}: got {value!r}, wanted right and down [pixels], each at most {_FARTHEST:g}")
+        raise InputError(f"{what}: got {value!r}, expected right and down [pixels], each at most {_FARTHEST:g}")
     return tuple(found)
 
 
@@ -142,12 +144,12 @@ def _matrix(what: str, value: Any) -> tuple[tuple[float, ...], ...]:
     wanted = "a 4 x 4 matrix by rows: a rotation times a scale, a shift, and 0 0 0 1"
     rows = [[_number(what, each) for each in read_list(what, row, 0)] for row in read_list(what, value, 0)]
     if [len(row) for row in rows] != [4] * 4 or rows[3] != [0, 0, 0, 1]:
-        raise InputError(f"{what}: got {value!r}, wanted {wanted}")
+        raise InputError(f"{what}: got {value!r}, expected {wanted}")
     turn = np.array(rows)[:3, :3]
     # A scale by axis would make other shapes of spheres, a mirror would turn them inside out.
     scale = np.cbrt(np.linalg.det(turn))
     if scale <= 0 or not np.allclose(turn @ turn.T, scale**2 * np.eye(3), atol=1e-5 * scale**2, rtol=0):
-        raise InputError(f"{what}: got axes that are not a rotation times a scale, wanted {wanted}")
+        raise InputError(f"{what}: got axes that are not a rotation times a scale, expected {wanted}")
     return tuple(map(tuple, rows))
 
 

@@ -158,7 +158,7 @@ def compare_frames(
         shifts = _shifts(frames.sequence("all"))
     notes: tuple[str, ...] = ()
     if len(kinds) > 1:
-        notes += (f'judged at pixel centres: the files do not say; wanted "pixel": {" or ".join(PIXELS)}',)
+        notes += (f'judged at pixel centres: the files do not say; expected "pixel": {" or ".join(PIXELS)}',)
     if repeated := masks["all"].repeated:
         notes += (f"frames {_listed(repeated)} repeat the frame before them, though the reference changed",)
     if NOTE in first.attributes:

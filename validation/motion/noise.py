@@ -92,7 +92,7 @@ class Noise:
             kind = "brighter" if self.largest_deviation > 0 else "darker"
             return (
                 f"whether there is a bias cannot be told: one value has {100 * self.largest_fraction:.2g} % of the "
-                f"variance of {self.runs} runs, so still {kind} ones may be missing; wanted more runs"
+                f"variance of {self.runs} runs, so still {kind} ones may be missing; expected more runs"
             )
         if low <= 0 <= high and self.root_bias is None:
             return f"no bias in {self.runs} runs; one of {100 * self.detectable_bias:.2g} % would have been found"
@@ -150,7 +150,7 @@ def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise
     """Return the noise with what several runs tell, from their relative errors as they are and blurred."""
     count = len(errors)
     if (errors[1:] == errors[0]).all():
-        raise InputError("runs: all are the same, bit by bit; wanted renders with a seed of their own each")
+        raise InputError("runs: all are the same, bit by bit; expected renders with a seed of their own each")
     flat = errors.reshape(count, -1)
     squared_bias, variance = parts_of_error(flat @ flat.T / flat.shape[1])
     biases = flat.mean(axis=1)
@@ -315,8 +315,8 @@ def run_paths(pattern: str | os.PathLike[str]) -> list[Path]:
     paths = sorted(path.parent.glob(path.name.replace("#", "[0-9]")))
     if len(paths) < 2:
         raise InputError(
-            f"{pattern}: {len(paths)} files have such a name; wanted two or more independent renders, # for each digit "
-            "of their numbers, such as runs/####.exr, or --frames for the frames of a scene that changes"
+            f"{pattern}: {len(paths)} files have such a name; expected two or more independent renders, # for each "
+            "digit of their numbers, such as runs/####.exr, or --frames for the frames of a scene that changes"
         )
     return paths
 

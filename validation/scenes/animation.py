@@ -45,7 +45,7 @@ def parse_moves(text: str) -> tuple[str, ...]:
     moves = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     for move in moves:
         if move not in MOVES:
-            raise InputError(f"--animate: got {move!r}, wanted some of {', '.join(MOVES)}, separated by commas")
+            raise InputError(f"--animate: got {move!r}, expected some of {', '.join(MOVES)}, separated by commas")
     return moves
 
 
@@ -65,7 +65,7 @@ def animate(scene: Scene, animation: Animation, frames: int) -> Iterator[Scene]:
     objects move.
     """
     if frames < 1:
-        raise InputError(f"frames: got {frames}, wanted at least 1")
+        raise InputError(f"frames: got {frames}, expected at least 1")
     step = _step(scene, animation)
     for number in range(frames):
         yield step(number / frames)

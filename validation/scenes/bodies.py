@@ -54,7 +54,7 @@ def check_bodies(scene: Any) -> None:
         if _overlap(read[first], read[second]):
             raise InputError(
                 f"the media of shapes '{shapes[first].id()}' and '{shapes[second].id()}' overlap or one holds the "
-                "other; wanted disjoint bounds"
+                "other; expected disjoint bounds"
             )
 
 
@@ -125,14 +125,14 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
         if around.pop(own, 0) != (0 if outwards else 1):
             flaw = "has a part within another" if outwards else "is inside out"
             raise InputError(
-                f"shape '{mesh.name}' bounds a medium and {flaw}, at {mesh.edge_words(tail, head)}; wanted faces that "
-                "run counter-clockwise seen from outside, and parts beside one another"
+                f"shape '{mesh.name}' bounds a medium and {flaw}, at {mesh.edge_words(tail, head)}; expected faces "
+                "that run counter-clockwise seen from outside, and parts beside one another"
             )
         nesting = [other for other, winding in around.items() if winding]
         if nesting:
             raise InputError(
                 f"the medium of shape '{mesh.name}' lies within that of shape '{meshes[nesting[0]].name}', at "
-                f"{mesh.edge_words(tail, head)}; wanted media beside one another, none nested"
+                f"{mesh.edge_words(tail, head)}; expected media beside one another, none nested"
             )
 
 
@@ -175,11 +175,11 @@ def _check_crossings(meshes: Mapping[int, ClosedMesh], boundary: Any) -> None:
             if against is mesh:
                 raise InputError(
                     f"shape '{mesh.name}' bounds a medium and crosses itself: {words} passes through triangle "
-                    f"{triangle[first]}; wanted a mesh without crossings"
+                    f"{triangle[first]}; expected a mesh without crossings"
                 )
             raise InputError(
                 f"the media of shapes '{mesh.name}' and '{against.name}' overlap: {words} of the first passes "
-                f"through triangle {triangle[first]} of the other; wanted disjoint bounds"
+                f"through triangle {triangle[first]} of the other; expected disjoint bounds"
             )
 
 

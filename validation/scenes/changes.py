@@ -100,7 +100,7 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
     for name, rows in matrices.items():
         if name not in shapes:
             known = (
-                f"wanted some of {', '.join(shapes)}{nearest(name, shapes)}" if shapes else "the scene has no shapes"
+                f"expected some of {', '.join(shapes)}{nearest(name, shapes)}" if shapes else "the scene has no shapes"
             )
             raise InputError(f"objects: got {name!r}, {known}")
         matrix = np.array(rows, dtype=np.float64)
@@ -116,7 +116,7 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
             moved = matrix @ np.array(parameters[place].matrix, dtype=np.float64).reshape(4, 4)
             parameters[place] = type(parameters[place])(moved)
         else:
-            raise InputError(f"objects: shape '{name}' cannot be moved; wanted a mesh, rectangle, disk or sphere")
+            raise InputError(f"objects: shape '{name}' cannot be moved; expected a mesh, rectangle, disk or sphere")
     parameters.update()
 
 
@@ -140,18 +140,18 @@ def _word(value: float) -> str:
 
 def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]) -> Values:
     if name not in known:
-        raise InputError(f"--change: got {name!r}, wanted one of {', '.join(known)}{nearest(name, known)}")
+        raise InputError(f"--change: got {name!r}, expected one of {', '.join(known)}{nearest(name, known)}")
     item = known[name]
     if len(values) not in item.sizes:
         sizes = " or ".join(str(size) for size in item.sizes)
-        raise InputError(f"{name}: got {len(values)} numbers, wanted {sizes}, with commas between them")
+        raise InputError(f"{name}: got {len(values)} numbers, expected {sizes}, with commas between them")
     numbers = np.array(values, dtype=np.float64)
     if not np.all((numbers >= item.least) & (numbers <= item.most)):
         given = ",".join(f"{value:g}" for value in values)
         unit = f" [{item.unit}]" if item.unit else ""
-        raise InputError(f"{name}: got {given}, wanted finite numbers from {item.least:g} to {item.most:g}{unit}")
+        raise InputError(f"{name}: got {given}, expected finite numbers from {item.least:g} to {item.most:g}{unit}")
     if item.direction and not np.any(numbers):
-        raise InputError(f"{name}: got {','.join('0' for _ in values)}, wanted a direction: not all of it 0")
+        raise InputError(f"{name}: got {','.join('0' for _ in values)}, expected a direction: not all of it 0")
     return tuple(float(value) for value in values)
 
 
@@ -198,7 +198,7 @@ def _looking(like, origin: Values, target: Values, up: Values):
     left = np.cross(up, forward)
     if not np.linalg.norm(left) > 1e-9 * np.linalg.norm(up) * np.linalg.norm(forward):
         raise InputError(
-            "camera: got a target at the origin, or straight up from it; wanted another camera.target or camera.up"
+            "camera: got a target at the origin, or straight up from it; expected another camera.target or camera.up"
         )
     return type(like)().look_at(origin=list(origin), target=list(target), up=list(up))
 
@@ -300,7 +300,7 @@ def _change_medium(medium, changed: Mapping[str, Values]) -> None:
     if "g" in changed and "phase_function.g" in parameters:
         parameters["phase_function.g"] = changed["g"][0]
     elif changed.get("g", (0.0,)) != (0.0,):
-        raise InputError(f"medium '{medium.id()}' is isotropic here; wanted its g when the scene is loaded")
+        raise InputError(f"medium '{medium.id()}' is isotropic here; expected its g when the scene is loaded")
     try:
         parameters.update()
     except (ValueError, RuntimeError) as error:  # of height fog, whose density has no bound then

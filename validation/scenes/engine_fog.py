@@ -34,15 +34,15 @@ ENGINES = tomllib.loads(Path(__file__).with_name("engine_fog.toml").read_text(en
 def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...], bool]:
     """Return the layers that an engine's parameters stand for, and whether they are constant below their bases."""
     if engine not in ENGINES:
-        raise ValueError(f"heightfog has engine = {engine}; wanted one of {', '.join(ENGINES)}")
+        raise ValueError(f"heightfog has engine = {engine}; expected one of {', '.join(ENGINES)}")
     values = {name: given.get(name, default) for name, default in ENGINES[engine]["parameters"].items()}
     missing = [name for name, value in values.items() if value == "needed"]
     if missing:
-        raise ValueError(f"heightfog of engine {engine} has no {missing[0]}; wanted {', '.join(values)}")
+        raise ValueError(f"heightfog of engine {engine} has no {missing[0]}; expected {', '.join(values)}")
     number = {name: float(value) for name, value in values.items()}
     if engine == "hdrp":
         if not number["meanFreePath"] > 0:
-            raise ValueError(f"heightfog has meanFreePath = {number['meanFreePath']:g}; wanted a length above 0 m")
+            raise ValueError(f"heightfog has meanFreePath = {number['meanFreePath']:g}; expected a length above 0 m")
         rise = max(number["maximumHeight"] - number["baseHeight"], _LEAST_DIFFERENCE)
         return ((1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),), True
     if engine == "playcanvas":
@@ -82,5 +82,5 @@ def parameters_of(engine: str, layers: Sequence[Layer], *, clamped: bool, consta
 
 def _above_zero(number: Mapping[str, float], name: str) -> float:
     if not number[name] > 0:
-        raise ValueError(f"heightfog has {name} = {number[name]:g}; wanted a number above 0")
+        raise ValueError(f"heightfog has {name} = {number[name]:g}; expected a number above 0")
     return number[name]

@@ -111,18 +111,18 @@ def _box(props: Any) -> tuple[float, float, list[float], Any]:
     """Return floor, cap, the unit vector up, and the transform of the box that Mitsuba gets."""
     if "to_world" not in props:
         raise ValueError(
-            "heightfog has no to_world; wanted the box of the fog: the unit cube from its floor to its cap"
+            "heightfog has no to_world; expected the box of the fog: the unit cube from its floor to its cap"
         )
     matrix = np.array(props["to_world"].matrix, dtype=np.float64).reshape(4, 4)
     height = float(np.linalg.norm(matrix[:3, 2]))
     if not (np.isfinite(matrix).all() and height > 0):
-        raise ValueError("heightfog has a to_world without a height; wanted its cap above its floor")
+        raise ValueError("heightfog has a to_world without a height; expected its cap above its floor")
     up = matrix[:3, 2] / height
     axis = int(np.argmax(np.abs(up)))
     level = np.abs(matrix[axis, :2]).max() <= 1e-6 * np.abs(matrix[axis, 2])
     if abs(up[axis]) < 1 - 1e-6 or not level:
         raise ValueError(
-            "heightfog has a to_world that is tilted; wanted its third axis along x, y or z, the others level"
+            "heightfog has a to_world that is tilted; expected its third axis along x, y or z, the others level"
         )
     up = np.sign(up) * (np.arange(3) == axis)
     floor = float(up @ matrix[:3, 3])
@@ -142,14 +142,14 @@ def _checked_largest(given: dict[str, float], clamped: bool, floor: float) -> fl
         sigma_t, base, scale = (given[f"{name}_{i}"] for name in ("sigma", "z", "H"))
         if sigma_t and not scale > 0:
             raise ValueError(
-                f"heightfog has sigma_{i} = {sigma_t:g} and H_{i} = {scale:g}; wanted a scale height above 0"
+                f"heightfog has sigma_{i} = {sigma_t:g} and H_{i} = {scale:g}; expected a scale height above 0"
             )
         if sigma_t:
             above = (max(floor - base, 0.0) if clamped else floor - base) / scale
             total += sigma_t * (math.exp(-above) if above > -700 else math.inf)
     negative = [name for name in ("sigma_0", "sigma_1", "sigma_2") if not given[name] >= 0]
     if negative:
-        raise ValueError(f"heightfog has {negative[0]} = {given[negative[0]]:g}; wanted an extinction of 0 or more")
+        raise ValueError(f"heightfog has {negative[0]} = {given[negative[0]]:g}; expected an extinction of 0 or more")
     if not total < 1e9:
         raise ValueError(
             f"heightfog has the extinction {total:g} per m at its floor, {floor:g} m: nothing bounds the density that "

@@ -120,24 +120,24 @@ def parse_size(text: str) -> tuple[int, int]:
     """Return width and height [pixels] from 'WIDTHxHEIGHT'."""
     match = re.fullmatch(r"(\d+)[xX](\d+)", text.strip())
     if not match:
-        raise InputError(f"size: got {text!r}, wanted WIDTHxHEIGHT in pixels, for example 800x600")
+        raise InputError(f"size: got {text!r}, expected WIDTHxHEIGHT in pixels, for example 800x600")
     return int(match[1]), int(match[2])
 
 
 def _existing(name_or_path: str) -> Path:
     path = Path(name_or_path)
     if name_or_path.strip() and path.is_dir():
-        raise InputError(f"scene: {name_or_path} is a folder; wanted the path of a Mitsuba XML file in it")
+        raise InputError(f"scene: {name_or_path} is a folder; expected the path of a Mitsuba XML file in it")
     if path.is_file():
         return path
     looks_like_path = path.suffix or os.sep in name_or_path
     if looks_like_path:
         raise InputError(
-            f"scene: there is no file {name_or_path}; wanted a Mitsuba XML file, random:SEED or one of "
+            f"scene: there is no file {name_or_path}; expected a Mitsuba XML file, random:SEED or one of "
             f"{', '.join(SCENES)}"
         )
     raise InputError(
-        f"scene: got {name_or_path!r}, wanted one of {', '.join(SCENES)}, random:SEED or the path of a "
+        f"scene: got {name_or_path!r}, expected one of {', '.join(SCENES)}, random:SEED or the path of a "
         "Mitsuba XML file" + nearest(name_or_path, SCENES)
     )
 
@@ -149,7 +149,7 @@ def _check_films(loaded: LoadedScene) -> None:
         where = f"scene {loaded.path or loaded.name}"
         if not all(1 <= n <= _LARGEST for n in size):
             raise InputError(
-                f"{where}: the camera's film has {size[0]} x {size[1]} pixels, wanted at least 1 x 1 and at most "
+                f"{where}: the camera's film has {size[0]} x {size[1]} pixels, expected at least 1 x 1 and at most "
                 f"{_LARGEST} on a side; change its width and height, or give --size"
             )
         if crop != size:
@@ -165,7 +165,7 @@ def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
     _check_depth(path)
     scene = read_file(path, lobes)
     if not isinstance(scene, mi.Scene):
-        raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; wanted a whole <scene>")
+        raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; expected a whole <scene>")
     name_shapes(scene)
     check_numbers(scene)
     check_bodies(scene)
@@ -199,13 +199,15 @@ def _check_depth(path: Path) -> None:
     with suppress(expat.ExpatError), path.open("rb") as file:  # what is malformed Mitsuba says best
         parser.ParseFile(file)
     if deepest > _DEEPEST:
-        raise InputError(f"scene {path}: its elements are nested {deepest} deep; wanted at most {_DEEPEST}")
+        raise InputError(f"scene {path}: its elements are nested {deepest} deep; expected at most {_DEEPEST}")
 
 
 def resize(scene, size: tuple[int, int]) -> None:
     """Set the image size of all cameras of a Mitsuba scene in place, width and height [pixels]."""
     if not all(1 <= n <= _LARGEST for n in size):
-        raise InputError(f"size: got {size[0]}x{size[1]}, wanted at least 1x1 and at most {_LARGEST} pixels on a side")
+        raise InputError(
+            f"size: got {size[0]}x{size[1]}, expected at least 1x1 and at most {_LARGEST} pixels on a side"
+        )
     for sensor in scene.sensors():
         parameters = mi.traverse(sensor)
         parameters["film.size"] = list(size)

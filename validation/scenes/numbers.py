@@ -83,8 +83,8 @@ def _check(name: str, key: str, values: Array) -> None:
         return
     if words[-1] == _CUTOFF and not np.all((values > 0) & (values < 90)):
         raise InputError(
-            f"{name}: {key} has {values.ravel()[0]:g} degrees; wanted more than 0 and less than 90: a wider light is a "
-            "'point' light"
+            f"{name}: {key} has {values.ravel()[0]:g} degrees; expected more than 0 and less than 90: a wider light is "
+            "a 'point' light"
         )
     light = any(word in _LIGHT for word in words)
     largest = np.inf if words[-1] in _CLIP else LARGEST_LIGHT if light else LARGEST_LENGTH
@@ -96,7 +96,7 @@ def _check(name: str, key: str, values: Array) -> None:
         given = f"{values[wrong].ravel()[0]:g}"
         given += f" in {int(wrong.sum())} of {values.size} places" if values.size > 1 else ""
         wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:.3g}"
-        raise InputError(f"{name}: {key} has {given}; wanted {wanted}: use other units, or the right sign")
+        raise InputError(f"{name}: {key} has {given}; expected {wanted}: use other units, or the right sign")
     if words[-1] == "to_world":
         _check_transform(name, key, values.reshape(4, 4))
 
@@ -105,7 +105,7 @@ def _check_transform(name: str, key: str, matrix: Array) -> None:
     scale = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if scale[-1] < _LEAST_SCALE or scale[-1] < _FLATTEST * scale[0]:
         raise InputError(
-            f"{name}: {key} scales an axis by {scale[-1]:.3g} and another by {scale[0]:.3g}; wanted at least "
+            f"{name}: {key} scales an axis by {scale[-1]:.3g} and another by {scale[0]:.3g}; expected at least "
             f"{_LEAST_SCALE:g} m, and {_FLATTEST:g} of the other: give it a size"
         )
 

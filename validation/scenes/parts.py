@@ -106,7 +106,7 @@ def tabulated_phase(words: str, values: int = 2001) -> dict[str, Any]:
     of a scene takes a time in proportion to their number.
     """
     if values < 2:
-        raise InputError(f"the table of '{words}' has {values} values; wanted at least 2")
+        raise InputError(f"the table of '{words}' has {values} values; expected at least 2")
     phase = phase_from_words(words)
     nodes, weights = np.polynomial.legendre.leggauss(32)
     t = 0.5 * (nodes + 1)

@@ -50,13 +50,13 @@ def phase_pair(name: str) -> PhasePair:
     if known.name in ("isotropic", "hg"):
         if abs(known.g) > LARGEST_G:
             raise InputError(
-                f"phase: got the mean cosine {known.g:g}, wanted -{LARGEST_G} to {LARGEST_G}, for example hg:0.85"
+                f"phase: got the mean cosine {known.g:g}, expected -{LARGEST_G} to {LARGEST_G}, for example hg:0.85"
             )
         return PhasePair(name, HenyeyGreensteinPhase(known.g), lambda: HenyeyGreenstein(known.g))
     if known.diameter is not None:
         return PhasePair(name, hg_draine_phase(known.diameter), lambda: _table(known))
     if known.droplets is None:
-        raise InputError(f"phase: got {name!r}, wanted isotropic, hg:G, hg-draine, mie, mie-modified or FILE.csv")
+        raise InputError(f"phase: got {name!r}, expected isotropic, hg:G, hg-draine, mie, mie-modified or FILE.csv")
     numbers = known.droplets.effective_radius, known.droplets.gamma, known.wavelength
     deterministic = droplet_phase(*numbers, modified=known.name == "mie-modified")
     return PhasePair(name, deterministic, lambda: _table(known))
@@ -79,22 +79,22 @@ def read_phase_file(path: Path) -> tuple[Array, Array]:
         rows = rows[1:]
     for number, cells in rows:
         if len(cells) != 2 or not all(map(_is_number, cells)):
-            raise InputError(f"{path}, line {number}: got {','.join(cells)!r}, wanted an angle [degrees] and a value")
+            raise InputError(f"{path}, line {number}: got {','.join(cells)!r}, expected an angle [degrees] and a value")
     if len(rows) < 2:
-        raise InputError(f"{path}: got {len(rows)} rows, wanted at least two, of angles from 0 to 180 degrees")
+        raise InputError(f"{path}: got {len(rows)} rows, expected at least two, of angles from 0 to 180 degrees")
     table = np.array([[float(cell) for cell in cells] for _, cells in rows])
     degrees, values = table.T
     if degrees[0] != 0 or degrees[-1] != 180:
-        raise InputError(f"{path}: got angles from {degrees[0]:g} to {degrees[-1]:g}, wanted 0 to 180 degrees")
+        raise InputError(f"{path}: got angles from {degrees[0]:g} to {degrees[-1]:g}, expected 0 to 180 degrees")
     falling = np.flatnonzero(np.diff(degrees) <= 0)
     if falling.size:
         raise InputError(f"{path}, line {rows[int(falling[0]) + 1][0]}: angles must increase from row to row")
     bad = np.flatnonzero((values < 0) | (values > 1e30))
     if bad.size:
         number = rows[int(bad[0])][0]
-        raise InputError(f"{path}, line {number}: got the value {values[bad[0]]:g}, wanted 0 to 1e30")
+        raise InputError(f"{path}, line {number}: got the value {values[bad[0]]:g}, expected 0 to 1e30")
     if not values[1:-1].any() and not (len(values) == 2 and values.any()):
-        raise InputError(f"{path}: all values are 0 between 0 and 180 degrees, wanted a phase function")
+        raise InputError(f"{path}: all values are 0 between 0 and 180 degrees, expected a phase function")
     return np.deg2rad(degrees), values / values.max()
 
 

@@ -53,13 +53,13 @@ def slab_request(
     """Return a request that was checked; words are read as the command takes them."""
     tau, sun, albedo = (_number(name, value) for name, value in (("tau", tau), ("sun", sun), ("albedo", albedo)))
     if not _SMALLEST_TAU <= tau <= THICKEST:
-        raise InputError(f"tau: got {tau:g}, wanted a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean free paths")
+        raise InputError(f"tau: got {tau:g}, expected a thickness of {_SMALLEST_TAU:g} to {THICKEST:g} mean free paths")
     if not 0 <= sun <= LARGEST_SUN:
         raise InputError(
-            f"sun: got {sun:g}, wanted a zenith angle from 0 to below 90 degrees; at 90 no light enters the slab"
+            f"sun: got {sun:g}, expected a zenith angle from 0 to below 90 degrees; at 90 no light enters the slab"
         )
     if not 0 <= albedo <= 1:
-        raise InputError(f"albedo: got {albedo:g}, wanted a fraction from 0 to 1")
+        raise InputError(f"albedo: got {albedo:g}, expected a fraction from 0 to 1")
     return SlabRequest(
         tau=tau,
         sun=sun,
@@ -77,16 +77,16 @@ def order_range(name: str) -> tuple[int, float]:
         return 1, math.inf
     form = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}|inf))?", name)
     if form is None:
-        raise InputError(f"orders: got {name!r}, wanted for example 1,2,4,8 or 3-4 or 31-inf, or sets, or all")
+        raise InputError(f"orders: got {name!r}, expected for example 1,2,4,8 or 3-4 or 31-inf, or sets, or all")
     first = int(form[1])
     last = math.inf if form[2] == "inf" else int(form[2] or first)
     if first < 1:
-        raise InputError(f"orders: got {name!r}, wanted orders from 1 on; light of order 0 was never scattered")
+        raise InputError(f"orders: got {name!r}, expected orders from 1 on; light of order 0 was never scattered")
     if last < first:
         raise InputError(f"orders: got {name!r}, which ends before it begins; write {form[2]}-{first}")
     highest = first - 1 if math.isinf(last) else last
     if highest > LARGEST_ORDER:
-        raise InputError(f"orders: got {name!r}, wanted orders up to {LARGEST_ORDER}, or {LARGEST_ORDER}-inf")
+        raise InputError(f"orders: got {name!r}, expected orders up to {LARGEST_ORDER}, or {LARGEST_ORDER}-inf")
     return first, last
 
 
@@ -97,7 +97,7 @@ def parse_orders(given: str | Sequence[str | int]) -> tuple[str, ...]:
     for name in names:
         order_range(name)
     if not names:
-        raise InputError("orders: got none, wanted for example 1,2,4,8 or sets or all")
+        raise InputError("orders: got none, expected for example 1,2,4,8 or sets or all")
     return tuple(dict.fromkeys(names))
 
 
@@ -108,7 +108,7 @@ def _depths(given: str | Sequence[float] | None, tau: float) -> tuple[float, ...
     depths = tuple(_number("depths", word) for word in words)
     for depth in depths:
         if not 0 <= depth <= tau:
-            raise InputError(f"depths: got {depth:g}, wanted depths of 0 to tau, {tau:g} mean free paths")
+            raise InputError(f"depths: got {depth:g}, expected depths of 0 to tau, {tau:g} mean free paths")
     return depths
 
 
@@ -120,11 +120,11 @@ def _directions(given: str | Sequence[tuple[float, float]]) -> tuple[tuple[float
     directions = []
     for pair in pairs:
         if len(pair) != 2:
-            raise InputError(f"directions: got {':'.join(pair)!r}, wanted MU:PHI, for example 0.5:180,-1:0")
+            raise InputError(f"directions: got {':'.join(pair)!r}, expected MU:PHI, for example 0.5:180,-1:0")
         mu, phi = (_number("directions", word) for word in pair)
         if not 1e-6 <= abs(mu) <= 1:
             raise InputError(
-                f"directions: got mu = {mu:g}, wanted -1 to 1, positive upwards, and not horizontal (0): from 1e-6 on"
+                f"directions: got mu = {mu:g}, expected -1 to 1, positive upwards, and not horizontal (0): from 1e-6 on"
             )
         directions.append((mu, phi))
     return tuple(directions)
@@ -134,7 +134,7 @@ def _number(name: str, word: str | float) -> float:
     try:
         value = float(word)
     except (TypeError, ValueError):
-        raise InputError(f"{name}: got {word!r}, wanted a number") from None
+        raise InputError(f"{name}: got {word!r}, expected a number") from None
     if not math.isfinite(value):
-        raise InputError(f"{name}: got {value}, wanted a finite number")
+        raise InputError(f"{name}: got {value}, expected a finite number")
     return value

@@ -214,9 +214,9 @@ def block_sums(values: Array, side: int = BLOCK) -> Array:
 def _check_levels(margin: float | None, family_level: float, plain_level: float) -> None:
     for name, level in (("family_level", family_level), ("plain_level", plain_level)):
         if not 0 < level < 1:
-            raise InputError(f"{name}: got {level}, wanted a probability between 0 and 1, such as 0.01")
+            raise InputError(f"{name}: got {level}, expected a probability between 0 and 1, such as 0.01")
     if margin is not None and not 0 < margin < np.inf:
-        raise InputError(f"margin: got {margin}, wanted a relative bias above 0, such as 0.005")
+        raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
 
 
 def _side(name: str, estimate: Estimate, chosen: Bools, *, scale: float, with_batches: bool) -> _Side:
@@ -230,14 +230,14 @@ def _side(name: str, estimate: Estimate, chosen: Bools, *, scale: float, with_ba
         given = np.asarray(estimate.standard_error, dtype=np.float64)
         if given.shape != shape:
             raise InputError(
-                f"the standard error of the {name} has shape {given.shape}; wanted that of its image, {shape}"
+                f"the standard error of the {name} has shape {given.shape}; expected that of its image, {shape}"
             )
         error = np.where(inside, given.reshape(mean.shape), 0.0) / scale
     wrong = int((~(np.isfinite(error) & (error >= 0))).any(axis=2).sum())
     if wrong:
         raise InputError(f"the standard error of the {name} is negative or not finite in {wrong} pixels; mask them")
     if estimate.batches is not None and estimate.batches < 2:
-        raise InputError(f"batches of the {name}: got {estimate.batches}, wanted at least 2 for a standard error")
+        raise InputError(f"batches of the {name}: got {estimate.batches}, expected at least 2 for a standard error")
     if estimate.batch_means is None or not with_batches:
         return _Side(mean, error, estimate.batches)
     means = np.asarray(estimate.batch_means, dtype=np.float64) / scale

@@ -149,7 +149,7 @@ def _function_name(function: Callable[..., Any]) -> str:
         named = getattr(named, part, None)
     if not callable(function) or named is not function:
         raise InputError(
-            f"method: got {function!r}, wanted a name or a function at the top of a module: give it a name there"
+            f"method: got {function!r}, expected a name or a function at the top of a module: give it a name there"
         )
     return name
 
@@ -176,7 +176,7 @@ def split_name(name: str) -> tuple[Kernel, int | None]:
     base, separator, digits = name.rpartition("-")
     if not (separator and base in KERNELS and digits.isascii() and digits.isdecimal()):
         raise InputError(
-            f"kernel: got {name!r}, wanted one of {', '.join(KERNELS)}, such a name with '-N', or 'module:function'"
+            f"kernel: got {name!r}, expected one of {', '.join(KERNELS)}, such a name with '-N', or 'module:function'"
             + nearest(name, KERNELS)
         )
     record = KERNELS[base]
@@ -196,7 +196,7 @@ def _imported(name: str) -> Callable[..., Any]:
     except MethodError as error:
         raise InputError(str(error)) from error
     if not callable(kernel):
-        raise InputError(f"kernel {name}: it is a {type(kernel).__name__}; wanted a function")
+        raise InputError(f"kernel {name}: it is a {type(kernel).__name__}; expected a function")
 
     @wraps(kernel)
     def guarded(*arguments: Any, **parameters: Any) -> Any:

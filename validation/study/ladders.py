@@ -65,7 +65,7 @@ def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
     """
     makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "map": _maps}
     if kind not in makers:
-        raise InputError(f"scaling: got {kind!r}, wanted some of {', '.join(GROWTH)}, with commas between them")
+        raise InputError(f"scaling: got {kind!r}, expected some of {', '.join(GROWTH)}, with commas between them")
     return makers[kind](name_or_path, size)
 
 
@@ -84,7 +84,7 @@ def _triangles(name: str, size: tuple[int, int]) -> list[Step]:
     levels = [level for level in range(10) if 0 < count * 4**level <= MOST_TRIANGLES]
     if len(levels) < 2:
         raise InputError(
-            f"scaling triangles: {name} has {count} triangles of opaque meshes; wanted some, and four times as many "
+            f"scaling triangles: {name} has {count} triangles of opaque meshes; expected some, and four times as many "
             f"not more than {MOST_TRIANGLES}; use another scene"
         )
     return [Step(count * 4**level, partial(_finer, name, size, level)) for level in levels]
@@ -98,7 +98,7 @@ def _lights(name: str, size: tuple[int, int]) -> list[Step]:
     scene = _read(name, size)
     count = len(scene.lights)
     if not count:
-        raise InputError(f"scaling lights: {name} has area lights only; wanted a point, spot or directional one")
+        raise InputError(f"scaling lights: {name} has area lights only; expected a point, spot or directional one")
     return [Step(count * copies, partial(with_copies, scene, copies)) for copies in _COPIES]
 
 

@@ -58,10 +58,10 @@ def method_motion(
     lights do not move, and too few frames or runs.
     """
     if runs < 2:
-        raise InputError(f"runs: got {runs}, wanted at least two")
+        raise InputError(f"runs: got {runs}, expected at least two")
     least = BEFORE + 2 if stimulus == "step" else 3
     if frames < least:
-        raise InputError(f"frames: got {frames}, wanted at least {least} for a {stimulus}")
+        raise InputError(f"frames: got {frames}, expected at least {least} for a {stimulus}")
     read = read_scene(scene)
     moves = Animation(moves=("light",), about=animation.about)
     places = list(islice(animate(read, moves, turn), frames)) if stimulus == "sweep" else _step(read, moves, frames)
@@ -96,7 +96,7 @@ def light_references(
     references: list[Array] = []
     for number, change in enumerate([*changes, changes[0]]):
         if not change:
-            raise InputError("the scene has area lights, which do not circle; wanted a scene without")
+            raise InputError("the scene has area lights, which do not circle; expected a scene without")
         change_scene(scene, change)
         if number < len(places):
             if progress is not None:

@@ -49,7 +49,7 @@ def method_noise(
     frame is a median while nothing moves. Raises InputError for fewer runs and a dark reference.
     """
     if runs < 2:
-        raise InputError(f"runs: got {runs}, wanted at least two")
+        raise InputError(f"runs: got {runs}, expected at least two")
     read, reference = read_scene(scene), reference_image(scene).airlight
     found = []
     for number, chosen in enumerate(configurations):

@@ -359,12 +359,12 @@ def _scene(what: str, item: Any, *, folder: Path) -> str:
         return word
     if is_random(word):
         if seed_of(word) is None:
-            raise InputError(f"scenes: got {word!r}, wanted random:SEED with a whole number from 0 on")
+            raise InputError(f"scenes: got {word!r}, expected random:SEED with a whole number from 0 on")
         return word
     path = folder / word
     if not path.is_file():
         raise InputError(
-            f"scenes: got {word!r}, wanted a built-in scene, random:SEED or a Mitsuba XML file beside the study"
+            f"scenes: got {word!r}, expected a built-in scene, random:SEED or a Mitsuba XML file beside the study"
             + nearest(word, SCENES)
         )
     return str(path.resolve())
@@ -382,10 +382,10 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
     changes: dict[str, tuple[float, ...]] = {}
     for name, value in read_table(what, item).items():
         if not name.partition(".")[0].startswith("medium"):
-            raise InputError(f"media: got {name!r}, wanted medium.sigma_t, medium.albedo or medium.g; quote the name")
+            raise InputError(f"media: got {name!r}, expected medium.sigma_t, medium.albedo or medium.g; quote the name")
         numbers = value if isinstance(value, list) else [value]
         if not numbers or not all(type(number) in (int, float) for number in numbers):
-            raise InputError(f"media: got {value!r} for {name}, wanted a number or a list of numbers")
+            raise InputError(f"media: got {value!r} for {name}, expected a number or a list of numbers")
         changes[name] = tuple(float(number) for number in numbers)
     return tuple(change_words(changes))
 
@@ -393,14 +393,14 @@ def _medium(what: str, item: Any) -> tuple[str, ...]:
 def _size(what: str, value: Any) -> tuple[int, int]:
     size = parse_size(read_word(what, value))
     if not all(1 <= side <= 16384 for side in size):
-        raise InputError(f"{what}: got {size[0]}x{size[1]}, wanted at least 1x1 and at most 16384 pixels on a side")
+        raise InputError(f"{what}: got {size[0]}x{size[1]}, expected at least 1x1 and at most 16384 pixels on a side")
     return size
 
 
 def _flip(what: str, value: Any) -> str:
     words = {True: "all", False: "none", "kinds": "kinds"}
     if value not in words:
-        raise InputError(f'{what}: got {value!r}, wanted true, false or "kinds"')
+        raise InputError(f'{what}: got {value!r}, expected true, false or "kinds"')
     return words[value]
 
 

@@ -93,7 +93,7 @@ def canonical_transport(phase: SlabPhase, albedo: float, *, progress: Progress |
     """
     if not 0 < albedo <= 1:
         raise InputError(
-            f"albedo: got {albedo:g}, wanted more than 0, at most 1: without scattering there is no transport"
+            f"albedo: got {albedo:g}, expected more than 0, at most 1: without scattering there is no transport"
         )
     digest, medium = transport_digest(), medium_numbers(phase, albedo)
     arrays = load_kept(digest, medium)

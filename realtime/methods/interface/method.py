@@ -104,7 +104,7 @@ class View(Rays):
     def random(self) -> Noise:
         """The random numbers of this frame of this run."""
         if self.noise is None:
-            raise InputError("noise: the method draws random numbers and does not say so; wanted `noisy` = True")
+            raise InputError("noise: the method draws random numbers and does not say so; expected `noisy` = True")
         return self.noise
 
     def visible(self, point, light: Any, asked=True):
@@ -116,7 +116,7 @@ class View(Rays):
             For a method that says that it casts no rays.
         """
         if self.scene is None:
-            raise InputError("visible: the method says that it casts no rays, and asks for some; wanted `casts_rays`")
+            raise InputError("visible: the method says that it casts no rays, and asks for some; expected `casts_rays`")
         return ~self.scene.ray_test(light.shadow_ray(point), asked)
 
     def geometry(self, light: Light) -> RayGeometry:

@@ -85,7 +85,7 @@ class LightVolumes(Method):
     def _check_together(self) -> None:
         if self.tessellation == "adaptive" and self.evaluation != "mesh":
             raise InputError(
-                f"tessellation=adaptive: got evaluation={self.evaluation}, which has no triangles to save; wanted "
+                f"tessellation=adaptive: got evaluation={self.evaluation}, which has no triangles to save; expected "
                 "evaluation=mesh with it"
             )
 
@@ -108,7 +108,7 @@ class LightVolumes(Method):
         """Refuse a mesh in bounded media, and more memory than the machine has."""
         if self.evaluation == "mesh" and scene.features.bounded:
             raise InputError(
-                "evaluation=mesh: the scene has a medium with bounds, wanted one medium that fills all space; use "
+                "evaluation=mesh: the scene has a medium with bounds, expected one medium that fills all space; use "
                 "evaluation=walk"
             )
         if scene.features.shadows:

@@ -26,7 +26,7 @@ def method_limit() -> float:
     with suppress(ValueError):
         if 0 < float(given) < math.inf:
             return float(given)
-    raise InputError(f"{LIMIT_VARIABLE}: got {given!r}, wanted a time above 0, such as 300 [s]")
+    raise InputError(f"{LIMIT_VARIABLE}: got {given!r}, expected a time above 0, such as 300 [s]")
 
 
 class ShaderHost:

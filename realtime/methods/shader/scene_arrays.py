@@ -49,7 +49,9 @@ def check_scene(scene: Scene, name: str) -> None:
         raise InputError(f"the scene has area lights: {wanted}; use soft-shafts, or write the method in Python")
     layers = sum(1 if light.axis is not None else 6 for light in scene.lights)
     if layers > _LAYERS:
-        raise InputError(f"the scene has {len(scene.lights)} lights, whose maps have {layers} faces: wanted {_LAYERS}")
+        raise InputError(
+            f"the scene has {len(scene.lights)} lights, whose maps have {layers} faces: expected {_LAYERS}"
+        )
 
 
 def ray_arrays(view: View, *, surfaces: bool) -> dict[str, Array]:

@@ -156,7 +156,7 @@ class _Reader:
             if word == "include":
                 name = re.fullmatch(r'"([^"]+)"', rest)
                 if name is None:
-                    raise InputError(f'{place}: got `#include {rest}`, wanted `#include "file"`')
+                    raise InputError(f'{place}: got `#include {rest}`, expected `#include "file"`')
                 other = path.parent / name[1]
                 if other.resolve() in (each.resolve() for each in (*within, path)):
                     raise InputError(f"{place}: {name[1]} includes itself")
@@ -186,8 +186,8 @@ class _Reader:
             self.frames = int(rest)
         else:
             raise InputError(
-                f"{place}: got `#pragma airlight {text}`, wanted set, uniform, pass, `shadows none` or `frames N` with "
-                "N from 1 to 1000"
+                f"{place}: got `#pragma airlight {text}`, expected set, uniform, pass, `shadows none` or `frames N` "
+                "with N from 1 to 1000"
             )
 
 
@@ -204,7 +204,7 @@ def _parameter(text: str, place: str, *, uniform: bool) -> ShaderParameter:
                 continue
     if found is None or value is None:
         raise InputError(
-            f'{place}: got `{word} {text}`, wanted `{word} NAME DEFAULT "help"`, such as `{word} STEPS 16`'
+            f'{place}: got `{word} {text}`, expected `{word} NAME DEFAULT "help"`, such as `{word} STEPS 16`'
         )
     return ShaderParameter(found[1], value, found[3] or "", uniform)
 
@@ -213,9 +213,9 @@ def _pass(text: str, place: str) -> Pass:
     found = _PASS.match(text)
     terms = tuple(found[2].split("x")) if found else ()
     if found is None or len(terms) not in (2, 3) or not all(map(_TERM.match, terms)):
-        raise InputError(f"{place}: got `pass {text}`, wanted `pass NAME size=W/2xH/2` or `pass NAME size=80x60x64`")
+        raise InputError(f"{place}: got `pass {text}`, expected `pass NAME size=W/2xH/2` or `pass NAME size=80x60x64`")
     if (found[3] or _FORMATS[0]) not in _FORMATS:
-        raise InputError(f"{place}: got the format {found[3]}, wanted one of {', '.join(_FORMATS)}")
+        raise InputError(f"{place}: got the format {found[3]}, expected one of {', '.join(_FORMATS)}")
     return Pass(found[1], terms, found[3] or _FORMATS[0])
 
 

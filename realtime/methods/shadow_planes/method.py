@@ -129,10 +129,10 @@ class ShadowPlanes(Method):
 
     def _check_together(self) -> None:
         if self.buffer == "8bit" and self.tolerance:
-            raise InputError("buffer=8bit: wanted tolerance=0; the buffer holds whole frames, pixel by pixel")
+            raise InputError("buffer=8bit: needs tolerance=0; the buffer holds whole frames, pixel by pixel")
         if self.sum == "gamma" and not self.segments:
             raise InputError(
-                "sum=gamma: wanted order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"
+                "sum=gamma: needs order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"
             )
 
     @property

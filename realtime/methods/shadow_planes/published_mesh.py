@@ -166,7 +166,7 @@ def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
     """
     if not medium.clear or not all(light.w for light in lights):
         raise InputError(
-            "evaluation=vertex: wanted bounded media in vacuum, and lights that have a place; use evaluation=pixel"
+            "evaluation=vertex: needs bounded media in vacuum, and lights that have a place; use evaluation=pixel"
         )
 
 

@@ -86,13 +86,13 @@ class SoftShafts(SoftShaftsParameters):
         size, scale = self.map, self.scale
         if camera.width % scale or camera.height % scale:
             raise InputError(
-                f"scale: got {scale} and an image of {camera.width} x {camera.height}, wanted one that divides both "
+                f"scale: got {scale} and an image of {camera.width} x {camera.height}, expected one that divides both "
                 "sides"
             )
         most = max(len(source) for source in sources)
         if self.interleave and (most > 16 or 16 % most):
             raise InputError(
-                f"interleave: got {most} points of a light, wanted 1, 2, 4, 8 or 16, of which a tile has each"
+                f"interleave: got {most} points of a light, expected 1, 2, 4, 8 or 16, of which a tile has each"
             )
         if self._with_maps and scene.features.shadows:
             one = maps_memory(type(camera.origin.x), 1, size)

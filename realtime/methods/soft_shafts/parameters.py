@@ -27,7 +27,7 @@ def check_width(value: Any) -> None:
     except (TypeError, ValueError):
         width = math.nan
     if not 0 < width <= MOST_HD:
-        raise InputError(f"hd: got {value!r}, wanted 'auto' or a number above 0 to {MOST_HD:g} [pixels]")
+        raise InputError(f"hd: got {value!r}, expected 'auto' or a number above 0 to {MOST_HD:g} [pixels]")
 
 
 def check_range(value: Any) -> None:
@@ -36,7 +36,7 @@ def check_range(value: Any) -> None:
     Raises InputError if `value` is not above 0; it may be infinite.
     """
     if not value > 0:
-        raise InputError(f"hr: got {value!r}, wanted a number above 0, or inf for a Gaussian")
+        raise InputError(f"hr: got {value!r}, expected a number above 0, or inf for a Gaussian")
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class SoftShaftsParameters(Method):
 
     def _check_together(self) -> None:
         if self.hd == AUTO and (self.filter != "bilateral" or self.guide != "depth"):
-            raise InputError("hd: auto has the depth for a guide; wanted filter=bilateral guide=depth with it")
+            raise InputError("hd: auto has the depth for a guide; expected filter=bilateral guide=depth with it")
 
     @property
     def width(self) -> float:

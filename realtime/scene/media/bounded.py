@@ -160,7 +160,7 @@ class BoundedMedia(Homogeneous):
             form = "exact" if polynomial is None or not light.w else "paper"
             if form != "exact" and not self.clear:
                 raise InputError(
-                    "kernel: got a polynomial, which has each medium in vacuum; wanted vacuum around the bounded "
+                    "kernel: got a polynomial, which has each medium in vacuum; expected vacuum around the bounded "
                     "media, or another kernel"
                 )
         else:

@@ -159,9 +159,9 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
 def check_form(medium: Medium, form: str, light: Light) -> None:
     """Refuse a form that is unknown or does not fit the media or the light."""
     if form not in FORMS:
-        raise InputError(f"media: got {form!r}, wanted one of {', '.join(FORMS)}")
+        raise InputError(f"media: got {form!r}, expected one of {', '.join(FORMS)}")
     if form != "exact" and medium.bounded_media and not medium.clear:
-        raise InputError(f"media={form}: wanted vacuum around the bounded media; use media=exact")
+        raise InputError(f"media={form}: needs vacuum around the bounded media; use media=exact")
     if not light.w and form != "exact":
         raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
 

@@ -153,7 +153,7 @@ class HeightFog(VaryingMedium):
         name = getattr(named, "__name__", "exact") if kernel is not None else "exact"
         if light.w and name not in ("exact", "quadrature"):
             raise InputError(
-                f"kernel: got {name}, which is of homogeneous fog; wanted exact, or quadrature with its nodes, in "
+                f"kernel: got {name}, which is of homogeneous fog; expected exact, or quadrature with its nodes, in "
                 "height fog"
             )
         nodes = getattr(kernel, "keywords", {}).get("nodes", 16) if name == "quadrature" else None

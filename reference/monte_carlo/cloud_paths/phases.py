@@ -127,4 +127,4 @@ def walk_phase(phase: PhaseFunction) -> WalkPhase:
     if phase.name == "tabulated":
         values = np.asarray(phase.table)
         return Tabulated(values / (0.5 * (values[1:] + values[:-1])).mean())
-    raise InputError(f"the walk has no phase function '{phase.name}'; wanted isotropic, hg, rayleigh or tabulated")
+    raise InputError(f"the walk has no phase function '{phase.name}'; expected isotropic, hg, rayleigh or tabulated")

@@ -130,7 +130,7 @@ def _phase(name: str, g: arb, down: acb, up: acb, analytic: bool) -> acb:
     if name == "hg":  # 1 + g^2 - 2 g c is (1 - g)^2 + 4 g (1 - c)/2, and (1 + g)^2 - 4 g (1 + c)/2: all terms positive
         base = (1 - g) ** 2 + 4 * g * down if g >= 0 else (1 + g) ** 2 - 4 * g * up
         return (1 - g * g) * base.rsqrt(analytic=analytic) ** 3
-    raise ValueError(f"the phase function is called {name!r}; wanted isotropic, rayleigh, hazy, murky or hg")
+    raise ValueError(f"the phase function is called {name!r}; expected isotropic, rayleigh, hazy, murky or hg")
 
 
 def _largest_phase(name: str, g: arb) -> arb:

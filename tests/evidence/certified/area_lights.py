@@ -147,7 +147,7 @@ def _agreed(first: Callable[[], Any], second: Callable[[], Any]) -> Any:
         fine = second()
         if mp.fabs(coarse - fine) > mpf(10) ** -_DIGITS * mp.fabs(fine):
             raise ArithmeticError(
-                f"two routes give {mp.nstr(coarse, 20)} and {mp.nstr(fine, 20)}; wanted {_DIGITS} equal digits"
+                f"two routes give {mp.nstr(coarse, 20)} and {mp.nstr(fine, 20)}; expected {_DIGITS} equal digits"
             )
         return fine
 

@@ -158,13 +158,13 @@ def isotropic_closed_form(foot: float, height: float, x0: float, x1: float, sigm
 def _special(foot: float, height: float, x0: float, x1: float, sigma_t: float, digits: int) -> float | None:
     """Check the inputs; return J where it takes no quadrature."""
     if digits < _FEWEST_DIGITS:
-        raise InputError(f"digits is {digits}; wanted at least {_FEWEST_DIGITS}: below, use analytic.panels")
+        raise InputError(f"digits is {digits}; expected at least {_FEWEST_DIGITS}: below, use analytic.panels")
     for name, number in (("foot", foot), ("height", height), ("x0", x0), ("sigma_t", sigma_t)):
         signed = name in ("foot", "x0")
         if not (math.isfinite(number) and (signed or number >= 0)):
-            raise InputError(f"{name} is {number}; wanted a finite number{'' if signed else ' >= 0'}")
+            raise InputError(f"{name} is {number}; expected a finite number{'' if signed else ' >= 0'}")
     if not x1 >= x0:
-        raise InputError(f"x1 is {x1}; wanted a number >= x0 = {x0}, or inf")
+        raise InputError(f"x1 is {x1}; expected a number >= x0 = {x0}, or inf")
     if x0 == x1:
         return 0.0
     return math.inf if height == 0 and x0 <= foot <= x1 else None

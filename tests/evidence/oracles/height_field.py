@@ -41,7 +41,7 @@ def height_field(shadow_map: ShadowMap, walls: NDArray[np.uint32] | None = None)
     size = shadow_map.size
     distance = np.array(shadow_map.distance, dtype=np.float64)
     if not np.all(distance > 0):
-        raise InputError(f"shadow map: got a distance of {np.min(distance):g}, wanted distances above 0 [m]")
+        raise InputError(f"shadow map: got a distance of {np.min(distance):g}, expected distances above 0 [m]")
     frames = _frames(shadow_map)
     at = np.linspace(-1.0, 1.0, size + 1)
     v, u = np.meshgrid(at, at, indexing="ij")

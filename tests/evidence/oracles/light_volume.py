@@ -79,9 +79,11 @@ def oracle_airlight(
     Valid for rays that miss the lights; a ray through one has an infinite airlight, whatever hides the light beyond it.
     """
     if reference.media:
-        raise InputError(f"medium '{reference.media[0].name}' has bounds; wanted one medium without bounds")
+        raise InputError(f"medium '{reference.media[0].name}' has bounds; expected one medium without bounds")
     if len(shadow_maps) != len(reference.lights):
-        raise InputError(f"got {len(shadow_maps)} shadow maps for {len(reference.lights)} lights; wanted one for each")
+        raise InputError(
+            f"got {len(shadow_maps)} shadow maps for {len(reference.lights)} lights; expected one for each"
+        )
     if distance is None:
         hits = surface_hits(reference)
         distance = exact_distance(reference, hits.interaction, hits.distance)

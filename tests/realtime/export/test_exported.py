@@ -130,12 +130,12 @@ def test_wgpu_compiles_what_is_exported():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"kernel": "taylor"}, "kernel: got 'taylor', wanted 'exact' or 'quadrature-N'"),
+        ({"kernel": "taylor"}, "kernel: got 'taylor', expected 'exact' or 'quadrature-N'"),
         ({"kernel": "quadrature-7"}, "an even N from 2 to 64"),
-        ({"language": "metal"}, "language: got 'metal', wanted one of glsl, hlsl, wgsl, slang"),
-        ({"phase": "mie:6"}, "phase: got 'mie:6', wanted isotropic"),
+        ({"language": "metal"}, "language: got 'metal', expected one of glsl, hlsl, wgsl, slang"),
+        ({"phase": "mie:6"}, "phase: got 'mie:6', expected isotropic"),
         ({"phase": "hg:0.5"}, "g is an argument"),
-        ({"phase": "fog"}, "wanted one of"),
+        ({"phase": "fog"}, "expected one of"),
     ],
 )
 def test_what_cannot_be_exported_is_refused(given, words):

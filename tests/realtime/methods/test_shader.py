@@ -138,7 +138,7 @@ vec3 airlight(Ray ray) { float all[COUNT]; return bright ? vec3(all.length(), ga
     assert (drawn(text).airlight == [3, 0.5, 0]).all()
     assert (drawn(text, COUNT="5", gain="0.25").airlight == [5, 0.25, 0]).all()
     assert (drawn(text, bright="no").airlight == 0).all()
-    with pytest.raises(InputError, match=r"got a parameter 'COUNTS', wanted one of: .*did you mean 'COUNT'"):
+    with pytest.raises(InputError, match=r"got a parameter 'COUNTS', expected one of: .*did you mean 'COUNT'"):
         drawn(text, COUNTS=1)
 
 
@@ -184,9 +184,9 @@ def test_messages_of_other_drivers_are_read(tmp_path, log, words):
             f"#pragma airlight pass half size=W/2xH/2\n{_BLACK}",
             "no function vec4 half",
         ),
-        ("#pragma airlight pass half size=2W\n", "line 1: got `pass half size=2W`, wanted"),
-        ("\n#pragma airlight set STEPS many\n", "line 2: got `set STEPS many`, wanted"),
-        ("#pragma airlight step 3\n", "line 1: got `#pragma airlight step 3`, wanted"),
+        ("#pragma airlight pass half size=2W\n", "line 1: got `pass half size=2W`, expected"),
+        ("\n#pragma airlight set STEPS many\n", "line 2: got `set STEPS many`, expected"),
+        ("#pragma airlight step 3\n", "line 1: got `#pragma airlight step 3`, expected"),
         (f"#pragma airlight set render 3\n{_BLACK}", "cannot be called render"),
         ('#include "nothing.glsl"\n', "line 1: there is no file"),
         ('#include "fog.glsl"\n', "line 1: fog.glsl includes itself"),

@@ -41,7 +41,7 @@ def divides(view):
 
 def refuses(view):
     import airlight
-    raise airlight.InputError("refuses: wanted less")
+    raise airlight.InputError("refuses: expected less")
 
 def loops(view):
     def body(i):
@@ -136,11 +136,11 @@ def test_a_function_of_each_ray_by_itself_is_interpolated(render):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("nothing", "returned a NoneType; wanted the radiance of every pixel"),
+        ("nothing", "returned a NoneType; expected the radiance of every pixel"),
         ("turned", "returned an array of shape (3, 192) for 192 pixels"),
         ("dark", "of 1 of 192 pixels is not finite, first in column 15 of row 11: nan, nan, nan"),
-        ("Lights", "returned the visibility of 0 lights, wanted that of 1"),
-        ("unready", "`prepare` returned a NoneType; wanted a function of the scene"),
+        ("Lights", "returned the visibility of 0 lights, expected that of 1"),
+        ("unready", "`prepare` returned a NoneType; expected a function of the scene"),
     ],
 )
 def test_a_wrong_result_is_refused_with_the_name_and_what_came(render, own, name, message):
@@ -165,7 +165,7 @@ def test_an_exception_names_file_and_line(render, own):
 @pytest.mark.claim("own-method-faults")
 def test_what_a_method_refuses_is_no_fault(render):
     """Its words stand alone, whichever of the two classes it raises: a fault would have file and line before them."""
-    with pytest.raises(InputError, match=r"^refuses: wanted less$"):
+    with pytest.raises(InputError, match=r"^refuses: expected less$"):
         render("refuses")
 
 
@@ -174,8 +174,8 @@ def test_what_a_method_refuses_is_no_fault(render):
     ("name", "message"),
     [
         ("gone", "has no 'gone'; it has grey, vector"),
-        ("NUMBER", "this is a int; wanted a function of the view"),
-        ("wants", "nothing gives 'steps' a value; wanted a keyword with a default"),
+        ("NUMBER", "this is a int; expected a function of the view"),
+        ("wants", "nothing gives 'steps' a value; expected a keyword with a default"),
     ],
 )
 def test_what_is_no_method_is_refused(own, name, message):

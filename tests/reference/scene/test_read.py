@@ -86,7 +86,7 @@ def test_shapes_are_sorted_and_others_refused_by_name(variant):
     assert shapes.triangles.shape == (2, 3, 3)
     assert shapes.centre == pytest.approx(np.array([[0.1, 0.1, 0.7]]), rel=1e-6)
     assert shapes.disks.centre == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
-    with pytest.raises(InputError, match="'lid' is a cylinder; wanted meshes, rectangles, spheres and disks"):
+    with pytest.raises(InputError, match="'lid' is a cylinder; expected meshes, rectangles, spheres and disks"):
         read_shapes(mi.load_dict(tiny_scene(lid=disk | {"type": "cylinder"})))
     oval = disk | {"to_world": mi.ScalarTransform4f().scale([1.0, 2.0, 1.0])}
     with pytest.raises(InputError, match="'lid' is an oval disk"):
@@ -187,7 +187,7 @@ def test_other_lights_and_scenes_without_clouds_are_refused(variant):
         read_clouds_of(puff=cloud(ball), lamp=point_light((0, 0, 4), (1.0, 1.1, 1.2)))
     with pytest.raises(InputError, match="the scene has no cloud"):
         read_clouds_of(a=mitsuba_mesh("solid", ball, (0.3, 0.4, 0.5)))
-    with pytest.raises(InputError, match="no light; wanted"):
+    with pytest.raises(InputError, match="no light; expected"):
         read_clouds_of(puff=cloud(ball), sun=None)
     np.testing.assert_allclose(
         read_clouds_of(puff=cloud(ball), sky=sky((0.1, 0.2, 0.3))).sky, (0.1, 0.2, 0.3), rtol=1e-6

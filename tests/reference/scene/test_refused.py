@@ -70,7 +70,7 @@ def fog(**entries: Any) -> dict[str, Any]:
 
 #: Scenes that both sides refuse, and words of both messages.
 BOTH = [
-    (lambda: tiny_scene(lamp=None), "no light; wanted"),
+    (lambda: tiny_scene(lamp=None), "no light; expected"),
     (lambda: tiny_scene(lamp=None, sky={"type": "constant"}), "light 'sky'"),
     (lambda: tiny_scene(lamp=None, sun=sun()), "directional.*medium without bounds"),
     (lambda: tiny_scene(lamp=None, sun=sun(), puff=in_fog()), "directional.*medium without bounds"),
@@ -101,7 +101,7 @@ NUMBERS = [
     (lambda: fog(sigma_t=-1.0), "sigma_t"),
     (lambda: fog(sigma_t=float("nan")), "sigma_t"),
     (lambda: fog(albedo=1.5), "albedo"),
-    (lambda: tiny_scene(spot=spot(cutoff=95.0, beam=90.0)), "cutoff_angle .* 95 degrees; wanted more than 0"),
+    (lambda: tiny_scene(spot=spot(cutoff=95.0, beam=90.0)), "cutoff_angle .* 95 degrees; expected more than 0"),
     (lambda: lit("disk", size=0.3, **radiance({"type": "rgb", "value": [-1.0, 0.0, 0.0]})), "light '.*radiance"),
 ]
 #: Scenes that only the methods refuse.

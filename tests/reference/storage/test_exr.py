@@ -95,7 +95,7 @@ def test_attributes_keep_their_value(tmp_path):
     ("layers", "message"),
     [
         ({}, "without layers"),
-        ({"airlight": np.ones((2, 2))}, r"shape \(2, 2\); wanted \(height, width, 3\)"),
+        ({"airlight": np.ones((2, 2))}, r"shape \(2, 2\); expected \(height, width, 3\)"),
         ({"airlight": np.ones((2, 2, 3)), "surface": np.ones((2, 3, 3))}, "two sizes: 'airlight'.*'surface'"),
         ({"airlight": np.ones((2, 2, 3)), "total": np.full((2, 2, 3), 1.01)}, "'total' is not airlight"),
     ],

@@ -146,20 +146,20 @@ SMALL = {"scene": "open-fog", "size": (8, 6)}
 @pytest.mark.parametrize(
     ("name", "arguments", "words"),
     [
-        ("load_scene", {"scene": 3.5}, "got float, wanted a name"),
+        ("load_scene", {"scene": 3.5}, "got float, expected a name"),
         ("load_scene", {"scene": {"type": "scene"}}, "no sensor"),
         ("load_scene", {"scene": "open-fog", "size": (0, 4)}, "at least 1x1"),
-        ("load_scene", {"scene": "open-fog", "size": 8}, "wanted \\(width, height\\)"),
+        ("load_scene", {"scene": "open-fog", "size": 8}, "expected \\(width, height\\)"),
         ("render", SMALL | {"method": "ray-marhc"}, "did you mean 'ray-march'"),
         ("render", SMALL | {"method": "ray-march", "kernel": "exact"}, "calls no kernel"),
-        ("render", SMALL | {"method": "ray-march", "steps": 2.5}, "wanted a whole number"),
-        ("render", SMALL | {"method": lambda view: 0}, "wanted a name or a function at the top of a module"),
+        ("render", SMALL | {"method": "ray-march", "steps": 2.5}, "expected a whole number"),
+        ("render", SMALL | {"method": lambda view: 0}, "expected a name or a function at the top of a module"),
         ("render", SMALL | {"precision": "half"}, "precision"),
         ("reference", SMALL | {"pixel": "corner"}, "'centre' or 'area'"),
         ("compare", {"reference": ONES, "test": np.ones((2, 3, 3))}, "two sizes"),
         ("compare", {"reference": ONES, "test": ONES, "margin": 0.1}, "a margin wants standard errors"),
         ("compare", {"reference": [["a"]], "test": ONES}, "the reference: got list"),
-        ("compare", {"reference": ONES, "test": ONES, "mask": np.ones((2, 2))}, "wanted truth values"),
+        ("compare", {"reference": ONES, "test": ONES, "mask": np.ones((2, 2))}, "expected truth values"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(variant, name, arguments, words):

@@ -45,9 +45,9 @@ def test_the_status_and_the_json_say_what_is_worse(files, capsys):
     assert data["worse"] == 5
     assert run(["diff", paths[1], paths[0]]) == 0
     assert "5 better" in capsys.readouterr().out
-    method(new, "fog").update(refused="wanted a mesh [obj] in [0, 1]", times=None, error=None)
+    method(new, "fog").update(refused="expected a mesh [obj] in [0, 1]", times=None, error=None)
     assert run(["diff", *files(report(), new)]) == 1
-    assert "wanted a mesh [obj] in [0, 1]" in capsys.readouterr().out  # brackets are words
+    assert "expected a mesh [obj] in [0, 1]" in capsys.readouterr().out  # brackets are words
 
 
 def test_errors_of_noisy_methods_are_compared_by_their_intervals():

@@ -35,7 +35,7 @@ def command_that_raises(monkeypatch):
 @pytest.mark.parametrize(
     ("error", "status", "words"),
     [
-        (InputError("albedo: got 2,\n  wanted at most 1"), 2, "airlight: error: albedo: got 2, wanted at most 1"),
+        (InputError("albedo: got 2,\n  expected at most 1"), 2, "airlight: error: albedo: got 2, expected at most 1"),
         (RealtimeInputError("no light"), 2, "airlight: error: no light"),
         (MissingError("no libLLVM"), 3, "airlight: error: no libLLVM"),
         (FileNotFoundError(2, "No such file or directory", "a.exr"), 2, "error: a.exr: No such file or directory"),

@@ -30,8 +30,8 @@ def changed(folder, change):
     ("text", "message"),
     [
         ("{", "is not valid JSON"),
-        ("[]", "has no schema, wanted 'airlight-report/2'"),
-        ('{"schema": "airlight-report/1"}', "the schema 'airlight-report/1', wanted 'airlight-report/2'; make the"),
+        ("[]", "has no schema, expected 'airlight-report/2'"),
+        ('{"schema": "airlight-report/1"}', "the schema 'airlight-report/1', expected 'airlight-report/2'; make the"),
         (
             '{"schema": "airlight-report/2"}',
             "does not keep to airlight-report/2: report: Object missing required field `created`; make",

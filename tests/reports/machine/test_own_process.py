@@ -32,7 +32,7 @@ def test_what_is_returned_comes_back_and_what_is_printed_goes_to_the_error_strea
     ids=lambda value: getattr(value, "__name__", None),
 )
 def test_a_process_that_ends_says_how(variant, function, arguments, words):
-    with pytest.raises(EndedError, match=rf"^method fog\.py:f: ended its process, {words}; wanted"):
+    with pytest.raises(EndedError, match=rf"^method fog\.py:f: ended its process, {words}; expected"):
         run(function, *arguments)
 
 
@@ -49,8 +49,8 @@ def refuse(words):
 
 
 def test_a_refusal_comes_back_as_it_is(variant):
-    with pytest.raises(InputError, match=r"^wanted fog$") as caught:
-        run(refuse, "wanted fog")
+    with pytest.raises(InputError, match=r"^expected fog$") as caught:
+        run(refuse, "expected fog")
     assert type(caught.value) is InputError
 
 

@@ -124,5 +124,5 @@ def test_a_file_that_is_missing_or_of_another_size_is_refused(scene, tmp_path):
         scene_images(scene, tmp_path, 10**8)
     write_files(tmp_path)
     write_exr(tmp_path / "s" / "flat.exr", Image({"airlight": np.ones((4, 5, 3))}))
-    with pytest.raises(InputError, match=r"flat.exr: got 5 x 4 pixels, wanted the 32 x 24"):
+    with pytest.raises(InputError, match=r"flat.exr: got 5 x 4 pixels, expected the 32 x 24"):
         scene_images(scene, tmp_path, 10**8)

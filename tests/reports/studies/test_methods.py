@@ -119,5 +119,5 @@ def test_noise_and_bias_of_methods_are_told_apart(variant, tmp_path):
     assert abs(brighter.bias.value - 0.5) < 4 * brighter.bias.error
     # The noise is that of the same random numbers, once and a half as large.
     assert math.sqrt(brighter.variance.value / noisy.variance.value) == pytest.approx(1.5, rel=1e-5)
-    with pytest.raises(airlight.InputError, match="runs: got 1, wanted at least two"):
+    with pytest.raises(airlight.InputError, match="runs: got 1, expected at least two"):
         airlight.study("noise", "open-fog", runs=1, size=TINY)

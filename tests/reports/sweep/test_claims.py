@@ -134,7 +134,7 @@ def test_refusals_are_counted_by_reason(sweep_of):
     refused = [each for each in several if each["status"] == "refused"]
     several.append(row("hall", status="hung", reason="longer than 60 s"))
     (refusal, hung) = reasons(sweep_of(several))
-    assert refusal.reason == "SCENE has N lights, wanted at most N"
+    assert refusal.reason == "SCENE has N lights, expected at most N"
     assert (refusal.cells, refusal.scenes) == (len(refused), len(refused))
     assert refusal.labels == ("light-volumes (exact)",)
     assert refusal.example == refused[0]["command"]
@@ -213,7 +213,7 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda path: None, "is not there; wanted the folder of a sweep"),
+        (lambda path: None, "is not there; expected the folder of a sweep"),
         (lambda path: path.write_bytes(b""), "cannot be read as Parquet"),
         (lambda path: pq.write_table(pa.table({"a": [1]}), path), "has no column 'key'"),
         (lambda path: write_rows(path, []), "has no rows"),

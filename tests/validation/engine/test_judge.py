@@ -79,7 +79,7 @@ def test_margin_decides_without_standard_errors(scene, expected, write):
     assert compare_scene(scene, file, margin=0.011).comparison.failures == ()
     (reason,) = compare_scene(scene, file, margin=0.009).comparison.failures
     assert reason == "the relative bias, +0.01, is not within +-0.009"
-    with refused("margin: got 0, wanted a relative bias above 0"):
+    with refused("margin: got 0, expected a relative bias above 0"):
         compare_scene(scene, file, margin=0)
     nan = expected.airlight.copy()
     nan[2, 3] = np.nan

@@ -363,7 +363,7 @@ def test_sets_are_disjoint():
     assert cloud_orders("all") == ()
     with pytest.raises(InputError, match="names order 3 twice"):
         cloud_orders("1-3,3-4")
-    with pytest.raises(InputError, match="wanted for example"):
+    with pytest.raises(InputError, match="expected for example"):
         cloud_orders("many")
 
 

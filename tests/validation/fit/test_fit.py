@@ -82,7 +82,7 @@ def test_heights_of_a_layer_are_found_in_an_image_by_other_code(variant, tmp_pat
     # A layer has three numbers and is two: what its base does, its extinction does too.
     both = fit_image(image, load_scene(str(scene), (64, 48)), ["sigma_1", "z_1"], pixel="centre")
     assert both.confounded[0].parameters == ("sigma_1", "z_1")
-    with pytest.raises(InputError, match="wanted some of sigma_1, z_1, H_1, sigma_0, albedo"):
+    with pytest.raises(InputError, match="expected some of sigma_1, z_1, H_1, sigma_0, albedo"):
         fit_image(image, load_scene(str(scene), (64, 48)), ["sigma_t"], pixel="centre")
 
 
@@ -179,7 +179,7 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
 @pytest.mark.parametrize(
     ("names", "how", "words"),
     [
-        ([], {}, "wanted some of sigma_t"),
+        ([], {}, "expected some of sigma_t"),
         (["sigma"], {}, "did you mean 'sigma_t'"),
         (["sigma_t"], {"starts": {"albedo": 0.5}}, "is not looked for"),
         (["H_1"], {}, "the scene has no height fog"),

@@ -338,7 +338,7 @@ def test_both_files(data_folder):
     [
         ("phase,g,t,h,x0,x1\nhazy,0,1,1,0,1\n", "line 1: no column 'sigma_t'"),
         (HEAD + "hazy,0,1,1,0,1,0.1\nhazy,0,1,one,0,1,0.1\n", "line 3, column 'h': 'one' is not a number"),
-        (HEAD + "hazy,0,1,-1,0,1,0.1\n", "line 2, column 'h': -1 is out of range; wanted a number >= 0"),
+        (HEAD + "hazy,0,1,-1,0,1,0.1\n", "line 2, column 'h': -1 is out of range; expected a number >= 0"),
         (
             HEAD + "hazi,0,1,1,0,1,0.1\n",
             "line 2, column 'phase': no phase function is called 'hazi'; did you mean 'hazy'",
@@ -348,7 +348,7 @@ def test_both_files(data_folder):
         ("", "no lines"),
         (
             "phase,ox,oy,oz,dx,dy,dz,lx,ly,lz,x0,x1,sigma_t\nhazy,0,0,0,0,0,2,1,1,1,0,1,0.1\n",
-            "line 2, column 'dx': 0 is out of range; wanted a direction of length 1",
+            "line 2, column 'dx': 0 is out of range; expected a direction of length 1",
         ),
     ],
 )

@@ -241,8 +241,8 @@ def test_images_of_two_sizes_are_refused(metric):
     [
         (error_metrics, (2, 2), {"mask": np.ones((2, 3), bool)}, r"a mask of bool \(2, 3\)"),
         (error_metrics, (2, 2), {"mask": np.zeros((2, 2), bool)}, "leaves no pixel"),
-        (published_errors, (3, 4), {"unit": 0.0}, "unit: got 0.0, wanted a radiance above 0"),
-        (colour_difference, (3, 4, 2), {}, "2 channels has no colour; wanted one"),
+        (published_errors, (3, 4), {"unit": 0.0}, "unit: got 0.0, expected a radiance above 0"),
+        (colour_difference, (3, 4, 2), {}, "2 channels has no colour; expected one"),
     ],
 )
 def test_refuses_what_does_not_fit(metric, shape, options, message):

@@ -101,10 +101,10 @@ def test_words_of_changes_come_back_to_the_last_digit():
     ("change", "message"),
     [
         ("medium.sigma=1", "did you mean 'medium.sigma_t'?"),
-        ("light.position=1,2", "light.position: got 2 numbers, wanted 3"),
-        ("medium.g=1", "medium.g: got 1, wanted finite numbers from -0.99 to 0.99"),
-        ("medium.sigma_t=thick", "got 'medium.sigma_t=thick', wanted NAME=NUMBER"),
-        ("camera.up=0,0,0", "camera.up: got 0,0,0, wanted a direction"),
+        ("light.position=1,2", "light.position: got 2 numbers, expected 3"),
+        ("medium.g=1", "medium.g: got 1, expected finite numbers from -0.99 to 0.99"),
+        ("medium.sigma_t=thick", "got 'medium.sigma_t=thick', expected NAME=NUMBER"),
+        ("camera.up=0,0,0", "camera.up: got 0,0,0, expected a direction"),
         ("camera.target=0,0,0", ""),
     ],
 )

@@ -71,8 +71,8 @@ def test_a_dictionary_gives_the_same_medium(loaded):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('name="H_1" value="2.7"', 'name="H_1" value="0"', "H_1 = 0; wanted a scale height above 0"),
-        ('name="sigma_2" value="0.02"', 'name="sigma_2" value="-0.02"', "sigma_2 = -0.02; wanted an extinction"),
+        ('name="H_1" value="2.7"', 'name="H_1" value="0"', "H_1 = 0; expected a scale height above 0"),
+        ('name="sigma_2" value="0.02"', 'name="sigma_2" value="-0.02"', "sigma_2 = -0.02; expected an extinction"),
         ('name="H_1" value="2.7"', 'name="H_1" value="0.001"', "nothing bounds the density"),
         ('<translate x="-20"', '<rotate x="1" angle="20"/><translate x="-20"', "tilted"),
         ('<scale x="40" y="40" z="43"/>', '<scale x="40" y="40" z="0"/>', "without a height"),
@@ -147,7 +147,7 @@ def test_a_scene_in_unreals_words(variant, tmp_path):
     assert medium.layers[0] == pytest.approx((0.0240226507, 1.5, 3.6067376), rel=1e-6)
     with pytest.raises(InputError, match="has no FogHeightFalloff"):
         load(("FogDensity", 0.5))
-    with pytest.raises(InputError, match="engine = godot; wanted one of unreal"):
+    with pytest.raises(InputError, match="engine = godot; expected one of unreal"):
         load(engine="godot")
     with pytest.raises(InputError, match="sigma_1"):
         load(("FogDensity", 0.5), ("FogHeightFalloff", 4.0), ("sigma_1", 1.0))

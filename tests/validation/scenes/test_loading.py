@@ -110,7 +110,7 @@ def test_overlapping_media_are_named(variant, tmp_path):
 def test_deep_elements_are_refused(variant, tmp_path):
     """Mitsuba's reader calls itself for each and ended the process."""
     deep = "<scene version='3.0.0'>" + "<shape>" * 20000 + "</shape>" * 20000 + "</scene>"
-    with pytest.raises(InputError, match="nested 20001 deep; wanted at most 200"):
+    with pytest.raises(InputError, match="nested 20001 deep; expected at most 200"):
         load(tmp_path, deep)
 
 

@@ -98,13 +98,13 @@ def test_a_table_of_a_function_is_the_function(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"tau": 1e9}, "wanted a thickness"),
+        ({"tau": 1e9}, "expected a thickness"),
         ({"sun": 90}, "at 90 no light enters"),
-        ({"albedo": 1.01}, "wanted a fraction from 0 to 1"),
+        ({"albedo": 1.01}, "expected a fraction from 0 to 1"),
         ({"orders": "0"}, "was never scattered"),
-        ({"depths": "0,2.5"}, "wanted depths of 0 to tau"),
+        ({"depths": "0,2.5"}, "expected depths of 0 to tau"),
         ({"directions": "0:0"}, "not horizontal"),
-        ({"phase": "hg:0.99"}, "wanted -0.98 to 0.98"),
+        ({"phase": "hg:0.99"}, "expected -0.98 to 0.98"),
     ],
 )
 def test_what_is_refused(change, words):
@@ -117,7 +117,7 @@ def test_what_is_refused(change, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("0,1\n90,1\n", "wanted 0 to 180 degrees"),
+        ("0,1\n90,1\n", "expected 0 to 180 degrees"),
         ("0,1\n90,-2\n180,1\n", "line 2: got the value -2"),
         ("angle,p\n0,1\n90,1\n80,1\n180,1\n", "line 4: angles must increase"),
     ],

@@ -124,9 +124,9 @@ GOOD = Estimate(np.ones((4, 4)), np.ones((4, 4)), 8)
     ("test", "options", "message"),
     [
         (Estimate(np.ones((4, 5))), {}, "two sizes: the reference is 4 x 4 pixels, the test 5 x 4"),
-        (dataclasses.replace(GOOD, standard_error=np.ones((4, 4, 3))), {}, r"has shape \(4, 4, 3\); wanted that"),
+        (dataclasses.replace(GOOD, standard_error=np.ones((4, 4, 3))), {}, r"has shape \(4, 4, 3\); expected that"),
         (dataclasses.replace(GOOD, standard_error=-np.ones((4, 4))), {}, "negative or not finite in 16 pixels"),
-        (dataclasses.replace(GOOD, batches=1), {}, "batches of the test: got 1, wanted at least 2"),
+        (dataclasses.replace(GOOD, batches=1), {}, "batches of the test: got 1, expected at least 2"),
         (dataclasses.replace(GOOD, batch_means=[0.9, 1.0]), {}, "have the mean 0.95, the pixels compared 1; give"),
         (GOOD, {"margin": 0.0}, "margin: got 0.0"),
     ],

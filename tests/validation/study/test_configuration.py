@@ -60,7 +60,7 @@ def test_chosen_methods_bring_their_standard_configurations():
 
 def test_settings_are_read():
     assert parse_settings(["steps=100", " shadow = map ", "a=b=c"]) == {"steps": "100", "shadow": "map", "a": "b=c"}
-    with refused("--set: got points=3 and points=5, wanted one of them"):
+    with refused("--set: got points=3 and points=5, expected one of them"):
         parse_settings(["points=3", "pattern=grid", "points=5"])
     assert parse_settings(["points=3", " points = 3"]) == {"points": "3"}
 
@@ -80,7 +80,7 @@ def test_method_of_ones_own_has_no_kernel_unless_it_takes_one(own_module):
     assert chosen_configurations([f"{own_module}:g"]) == (Configuration(f"{own_module}:g", "exact"),)
     with refused("calls no kernel"):
         configuration(f"{own_module}:f", "taylor")
-    with refused("on got 'maybe', wanted true or false"):
+    with refused("on got 'maybe', expected true or false"):
         configuration(f"{own_module}:f", None, {"on": "maybe"})
     with refused("has no 'h'"):
         configuration(f"{own_module}:h")
@@ -124,7 +124,7 @@ NO_NAMES = ("quadratur", "quadrature-", "quadrature-x", "quadrature-1.5", "-4", 
 
 @pytest.mark.parametrize("name", [*NO_KERNELS, *NO_NAMES])
 def test_what_is_no_kernel_is_refused_by_name(name):
-    with pytest.raises(InputError, match=f"^kernel.*{name}" if name in NO_KERNELS else "wanted one of exact"):
+    with pytest.raises(InputError, match=f"^kernel.*{name}" if name in NO_KERNELS else "expected one of exact"):
         find_kernel(name)
 
 
@@ -171,15 +171,15 @@ def test_a_file_with_its_own_scenes_and_random_ones(tmp_path):
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        ({"scenes": ["spere-spot"]}, "'spere-spot', wanted .* did you mean 'sphere-spot'"),
+        ({"scenes": ["spere-spot"]}, "'spere-spot', expected .* did you mean 'sphere-spot'"),
         ({"scenes": ["cumulus"]}, "cumulus scatters light many times"),
         ({"scenes": ["windows", "windows"]}, "scenes: 'windows' is there twice"),
-        ({"sceens": ["windows"]}, "got sceens, wanted one of .* did you mean 'scenes'"),
+        ({"sceens": ["windows"]}, "got sceens, expected one of .* did you mean 'scenes'"),
         ({"methods": ["unshadowed"], "kernels": ["exakt"]}, "exakt"),
         ({"methods": ["froxel-fog"], "kernels": ["exact"]}, "kernels: none of the methods calls one"),
         ({"methods": ["ray-march"], "parameters": {"ray-march": {"stepz": 3}}}, "stepz.*steps"),
         ({"methods": ["light-volumes"], "maps": [64], "parameters": {"light-volumes": {"map": 3}}}, "give one of them"),
-        ({"media": [{"light.intensity": 3}]}, "media: got 'light.intensity', wanted medium.sigma_t"),
+        ({"media": [{"light.intensity": 3}]}, "media: got 'light.intensity', expected medium.sigma_t"),
         ({"timed": 3}, 'timed: it is of times = "alone", got times = "with"'),
     ],
 )

@@ -47,7 +47,7 @@ def test_a_jump_is_a_cliff():
 @pytest.mark.parametrize(
     ("kind", "scene", "why"),
     [
-        ("speed", "open-fog", "wanted some of size, triangles"),
+        ("speed", "open-fog", "expected some of size, triangles"),
         ("triangles", "open-fog", "has 0 triangles"),
         ("lights", "fence", "area lights only"),
     ],

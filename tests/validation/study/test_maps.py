@@ -156,5 +156,5 @@ def test_what_does_not_move_is_refused(variant):
     loaded = load_scene("penumbra-plane", (16, 12))
     with pytest.raises(InputError, match="area lights"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1])
-    with pytest.raises(InputError, match="wanted at least 10 for a step"):
+    with pytest.raises(InputError, match="expected at least 10 for a step"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1], stimulus="step", frames=9)

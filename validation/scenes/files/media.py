@@ -97,7 +97,7 @@ def _refuse_names(props: Any) -> None:
         extinction = _numbers(props, "sigma_t")
         product = "" if extinction is None else f': <rgb name="sigma_t" value="{_words(extinction * times)}"/>'
         raise InputError(
-            f"{name} has a density, which a homogeneous medium has not; wanted sigma_t [1/m] and albedo: multiply "
+            f"{name} has a density, which a homogeneous medium has not; expected sigma_t [1/m] and albedo: multiply "
             f"sigma_t by the density and remove it{product}"
         )
     if not material:
@@ -113,7 +113,7 @@ def _refuse_names(props: Any) -> None:
             f'value="{_words(scattering / sigma_t)}"/> (per mm; the scale multiplies it)'
         )
     named = f"the material '{material}' of Mitsuba 0.6" + ("" if density is None else " and a density")
-    raise InputError(f"{name} names {named}; wanted {remedy} in {'its' if density is None else 'their'} place")
+    raise InputError(f"{name} names {named}; expected {remedy} in {'its' if density is None else 'their'} place")
 
 
 def _extinction(props: Any) -> tuple[Array, Array]:
@@ -121,7 +121,7 @@ def _extinction(props: Any) -> tuple[Array, Array]:
     known = {key: values for key in (*_OLD, "sigma_t") if (values := _numbers(props, key)) is not None}
     if "albedo" in props or len(known) != 2:
         given = ", ".join(key for key in (*_OLD, "sigma_t", "albedo") if key in props)
-        raise InputError(f"medium '{props.id()}' has {given}; wanted sigma_t and albedo, or sigma_s and sigma_a")
+        raise InputError(f"medium '{props.id()}' has {given}; expected sigma_t and albedo, or sigma_s and sigma_a")
     extinction = known["sigma_t"] if "sigma_t" in known else known["sigma_s"] + known["sigma_a"]
     scattering = known["sigma_s"] if "sigma_s" in known else extinction - known["sigma_a"]
     return extinction, np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
@@ -140,7 +140,7 @@ def _numbers(props: Any, key: str) -> Array | None:
         numbers = np.zeros(0)
     if numbers.size not in (1, 3):
         raise InputError(
-            f"medium '{props.id()}': {key} is no number and no 'rgb'; wanted sigma_t = sigma_s + sigma_a [1/m] and "
+            f"medium '{props.id()}': {key} is no number and no 'rgb'; expected sigma_t = sigma_s + sigma_a [1/m] and "
             "albedo = sigma_s / sigma_t in numbers"
         )
     return np.array(np.broadcast_to(numbers, 3))

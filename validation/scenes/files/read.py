@@ -120,7 +120,7 @@ def check_kinds(state: Any) -> None:
             if props.plugin_name() not in taken:
                 name = f"{_WORDS[part]} '{props.id()}'" if props.id() else f"a {_WORDS[part]} of the scene"
                 raise InputError(
-                    f"{name} is of type '{props.plugin_name()}'; wanted one of {', '.join(taken)}: replace it"
+                    f"{name} is of type '{props.plugin_name()}'; expected one of {', '.join(taken)}: replace it"
                     + " or remove it" * (part == "Emitter")
                 )
     for index in of_kind(state, "Emitter"):
@@ -134,12 +134,12 @@ def _check_camera(props: Any) -> None:
     name = f"camera '{props.id()}'"
     if props.plugin_name() != "perspective":
         raise InputError(
-            f"{name} is of type '{props.plugin_name()}'; wanted a sensor of type 'perspective', a pinhole: replace it"
+            f"{name} is of type '{props.plugin_name()}'; expected a sensor of type 'perspective', a pinhole: replace it"
         )
     for axis in "xy":
         key = f"principal_point_offset_{axis}"
         if key in props and float(props[key]):
-            raise InputError(f"{name} has {key} = {float(props[key]):g}; wanted none: remove it")
+            raise InputError(f"{name} has {key} = {float(props[key]):g}; expected none: remove it")
 
 
 def _check_light(state: Any, index: int) -> None:
@@ -150,6 +150,6 @@ def _check_light(state: Any, index: int) -> None:
         textured = properties(state, at).plugin_name() in _TEXTURES
         if key == "texture" or (key == wanted and textured):
             raise InputError(
-                f"{name}, of type '{props.plugin_name()}', has a texture as {key}; wanted one colour: remove the "
+                f"{name}, of type '{props.plugin_name()}', has a texture as {key}; expected one colour: remove the "
                 "texture, or give its mean as 'rgb'"
             )

@@ -31,7 +31,7 @@ def leave_out_media(state: Any, scene: Any) -> bool:
             word = properties(state, material).plugin_name()
             raise InputError(
                 f"shape '{shape.id()}' bounds a medium and has the material '{word}'; "
-                "wanted 'null', which lets light pass straight on: replace the material, or remove the media"
+                "expected 'null', which lets light pass straight on: replace the material, or remove the media"
             )
     shapes = [
         shape
@@ -125,5 +125,5 @@ class _Space:
                     found = f"medium '{there.id()}'" if there is not None else "no medium"
                     raise InputError(
                         f"shape '{shape.id()}' is opaque and references medium '{medium.id()}' as {side}, where there "
-                        f"is {found}; wanted no medium on it, or the one that it stands in"
+                        f"is {found}; expected no medium on it, or the one that it stands in"
                     )

@@ -52,7 +52,7 @@ def _copies(state: Any, index: int) -> Iterator[Any]:
         return
     group = next((at for _, at in references(instance) if properties(state, at).plugin_name() == "shapegroup"), None)
     if group is None:
-        raise InputError(f"shape '{instance.id()}' is an instance of no shape group; wanted a reference to one")
+        raise InputError(f"shape '{instance.id()}' is an instance of no shape group; expected a reference to one")
     place = instance.get("to_world", mi.ScalarAffineTransform4d())
     parts = [at for _, at in references(properties(state, group)) if kind(state, at) == "Shape"]
     for part in parts:

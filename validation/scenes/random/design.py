@@ -105,7 +105,7 @@ def point(seed: int) -> Mapping[str, float]:
     from scipy.stats import qmc
 
     if not 0 <= seed <= LARGEST_SEED:
-        raise InputError(f"random scene: got the seed {seed}, wanted a whole number from 0 to {LARGEST_SEED}")
+        raise InputError(f"random scene: got the seed {seed}, expected a whole number from 0 to {LARGEST_SEED}")
     sequence = qmc.Halton(len(COORDINATES), scramble=True, rng=np.random.default_rng(_SCRAMBLING))
     sequence.fast_forward(seed)
     values = sequence.random(1)[0]
@@ -146,7 +146,7 @@ def ranges_from(table: Mapping[str, Any], where: str = "ranges") -> Ranges:
 
 def _folder(what: str, value: Any) -> str:
     if not isinstance(value, str) or (value and not Path(value).is_dir()):
-        raise InputError(f"{what} is {value!r}; wanted a folder of .obj and .ply files")
+        raise InputError(f"{what} is {value!r}; expected a folder of .obj and .ply files")
     return value
 
 
@@ -154,7 +154,7 @@ def _range(what: str, value: Any, *, limits: tuple[float, float]) -> tuple[float
     pair = value if isinstance(value, list | tuple) else [value, value]
     found = tuple(float(read_number(what, each, *limits, whole=False)) for each in pair)
     if len(found) != 2 or found[0] > found[1]:
-        raise InputError(f"{what}: got {value!r}, wanted [from, to]")
+        raise InputError(f"{what}: got {value!r}, expected [from, to]")
     return found[0], found[1]
 
 
@@ -162,7 +162,7 @@ def _weights(what: str, value: Any, *, names: tuple[str, ...]) -> dict[str, floa
     read = partial(read_number, least=0, most=_HEAVIEST, whole=False)
     weights = read_named(f"{what}.", read_table(what, value), dict.fromkeys(names, read))
     if not any(weights.values()):
-        raise InputError(f"{what}: no weight is above 0; wanted one at least")
+        raise InputError(f"{what}: no weight is above 0; expected one at least")
     return {name: float(weights.get(name, 0.0)) for name in names}
 
 
@@ -183,8 +183,8 @@ def random_parts(name: str) -> tuple[int, Path | None]:
     """Return the seed in a name, and the file of ranges that it goes on with."""
     seed, comma, option = name.removeprefix(PREFIX).partition(",")
     if not (seed.isascii() and seed.isdecimal()):
-        raise InputError(f"scene: got {name!r}, wanted {PREFIX}SEED, a whole number, for example {PREFIX}7")
+        raise InputError(f"scene: got {name!r}, expected {PREFIX}SEED, a whole number, for example {PREFIX}7")
     key, _, value = option.partition("=")
     if comma and (key != "ranges" or not value or "," in value):
-        raise InputError(f"scene: got {option!r} in {name!r}, wanted ranges=FILE.toml after the seed")
+        raise InputError(f"scene: got {option!r} in {name!r}, expected ranges=FILE.toml after the seed")
     return int(seed), Path(unquote(value)) if comma else None

@@ -196,7 +196,7 @@ def _files(folder: str) -> list[Path]:
         return []
     files = sorted(path for path in Path(folder).iterdir() if path.suffix.lower() in (".obj", ".ply"))
     if not files:
-        raise InputError(f"meshes: {folder} holds no .obj or .ply file; wanted a folder of meshes")
+        raise InputError(f"meshes: {folder} holds no .obj or .ply file; expected a folder of meshes")
     return files
 
 
@@ -300,7 +300,7 @@ def _user_mesh(path: Path) -> Mesh:
         raise InputError(f"meshes: Mitsuba cannot read {path}: {' '.join(str(error).split())}") from error
     vertices, faces = mesh_triangles(shape)
     if not len(faces) or not np.isfinite(vertices).all():
-        raise InputError(f"meshes: {path} has no triangles or numbers that are not finite; wanted a mesh")
+        raise InputError(f"meshes: {path} has no triangles or numbers that are not finite; expected a mesh")
     used = vertices[np.unique(faces)]
     middle = 0.5 * (used.min(axis=0) + used.max(axis=0))
     size = float(np.linalg.norm(used - middle, axis=1).max())

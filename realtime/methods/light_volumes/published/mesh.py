@@ -49,7 +49,7 @@ def volume_mesh(
     the light.
     """
     if tessellation not in ("static", "adaptive"):
-        raise InputError(f"tessellation: got {tessellation!r}, wanted static or adaptive")
+        raise InputError(f"tessellation: got {tessellation!r}, expected static or adaptive")
     height = _heights(shadow_map)
     if tessellation == "static":
         return _static_mesh(shadow_map, light, height)

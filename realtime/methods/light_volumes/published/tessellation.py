@@ -64,7 +64,7 @@ def edges(height, threshold: float) -> list[Any]:
     number.
     """
     if not 0 < threshold < np.inf:
-        raise InputError(f"threshold: got {threshold!r}, wanted a positive number, for instance 0.001")
+        raise InputError(f"threshold: got {threshold!r}, expected a positive number, for instance 0.001")
     size = height.shape[1] - 1
     marks_by_level = []
     for level in range(size.bit_length() - 1):

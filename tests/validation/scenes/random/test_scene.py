@@ -57,9 +57,9 @@ KEPT = "626df2435b5b8389"
 
 def test_a_name_that_is_no_seed_is_refused():
     for name in ("random:", "random:seven", "random:-1", "random:7,meshes=.", "random:7,ranges=", "random:1:2"):
-        with pytest.raises(InputError, match=r"wanted random:SEED|wanted ranges=FILE"):
+        with pytest.raises(InputError, match=r"expected random:SEED|expected ranges=FILE"):
             load_scene(name)
-    with pytest.raises(InputError, match="wanted a whole number from 0"):
+    with pytest.raises(InputError, match="expected a whole number from 0"):
         load_scene("random:1000000001")
 
 
@@ -95,13 +95,13 @@ def test_what_is_set_is_drawn():
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"optical_dept": [1, 2]}, "got optical_dept, wanted one of .*did you mean 'optical_depth'"),
-        ({"fov": [50, 20]}, r"fov: got \[50, 20\], wanted \[from, to\]"),
-        ({"fov": [50, 200]}, "fov: got 200, wanted a number from 1 to 160"),
-        ({"light_kinds": {"laser": 1}}, "got light_kinds.laser, wanted one of point, spot"),
+        ({"optical_dept": [1, 2]}, "got optical_dept, expected one of .*did you mean 'optical_depth'"),
+        ({"fov": [50, 20]}, r"fov: got \[50, 20\], expected \[from, to\]"),
+        ({"fov": [50, 200]}, "fov: got 200, expected a number from 1 to 160"),
+        ({"light_kinds": {"laser": 1}}, "got light_kinds.laser, expected one of point, spot"),
         ({"light_kinds": {"point": 0}}, "no weight is above 0"),
-        ({"light_kinds": {"point": -1}}, "light_kinds.point: got -1, wanted a number from 0 to"),
-        ({"meshes": "/nowhere/at/all"}, "wanted a folder of .obj and .ply files"),
+        ({"light_kinds": {"point": -1}}, "light_kinds.point: got -1, expected a number from 0 to"),
+        ({"meshes": "/nowhere/at/all"}, "expected a folder of .obj and .ply files"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused_by_name(table, words):
