@@ -16,6 +16,7 @@ from reports.api.inputs import (
     Progress,
     SceneLike,
     Words,
+    exclude,
     listed,
     one_error,
     scene_names,
@@ -119,26 +120,18 @@ def compare(
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and not Path(str(test)).is_file():
         raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
-    own = {"layer with its content": holds, "pixel": pixel, "diagnose": diagnose or None, "fit": fit, "frames": frames}
-    for name, value in own.items():
-        if value is not None and scene is None:
-            raise InputError(f"{name}: goes with a scene in the place of the reference; two images are what they are")
-    about = {"output": files or None, "margin": margin, "all_metrics": all_metrics or None}
-    given = [name for name, value in about.items() if value is not None]
-    if diagnose and fit is not None:
-        raise InputError("diagnose, fit: are two questions; give one of them")
+    about: dict[str, Any] = {"output": files, "margin": margin, "all_metrics": all_metrics}
+    if scene is None:
+        of_scenes = {"the content of the layer": holds, "pixel": pixel, "diagnose": diagnose, "fit": fit}
+        exclude("compare", "two images have no scene", {**of_scenes, "frames": frames})
+    if diagnose:
+        exclude("diagnose", "asks about all pixels of one image", {"fit": fit, "mask": mask, "frames": frames, **about})
+    if fit is not None:
+        exclude("fit", "asks for the fog of one image", {"frames": frames, **about})
     if frames is not None or (scene is not None and _are_several(test)):
-        single: dict[str, Any] = about | {"mask": mask, "diagnose": diagnose or None, "fit": fit}
-        others = [name for name, value in single.items() if value is not None and name != "margin"]
-        if others:
-            raise InputError(f"{', '.join(others)}: is about one image; leave it out for several files")
+        exclude("compare", "several files are judged together", about | {"mask": mask, "margin": None})
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
         return _several(str(scene), test, frames, progress=progress, **how)
-    if (diagnose or fit is not None) and given:
-        asked = "fit" if fit is not None else "diagnose"
-        raise InputError(f"{asked}: {', '.join(given)} is about a comparison; leave one out")
-    if diagnose and mask is not None:
-        raise InputError("diagnose: looks at all pixels; leave out the mask")
     for path in files:
         _check_difference(path)
     if fit is not None:

@@ -109,11 +109,16 @@ def several(things: Any) -> list[Any]:
     return list(things) if isinstance(things, list | tuple) else [things]
 
 
-def only_from(command: str, does: str, beside: Mapping[str, Any]) -> None:
-    """Refuse what is given beside `from`, which measures nothing."""
-    for name, value in beside.items():
-        if value not in (None, False, (), []):
-            raise InputError(f"{command}: got from together with {name}; from {does}, leave that out")
+def exclude(option: str, why: str, beside: Mapping[str, Any]) -> None:
+    """Refuse options that were given beside one that excludes them."""
+    given = [name for name, value in beside.items() if _is_given(value)]
+    if given:
+        raise InputError(f"{option}: {why}; leave out {', '.join(given)}")
+
+
+def _is_given(value: Any) -> bool:
+    """Return whether an option has a value other than None, False and an empty list; arrays have no truth value."""
+    return value is not None and value is not False and not (isinstance(value, list | tuple) and not value)
 
 
 def listed(name: str, words: Any) -> list[str]:

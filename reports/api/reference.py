@@ -14,6 +14,7 @@ from reports.api.inputs import (
     Size,
     Values,
     changes_of,
+    exclude,
     note,
     one_error,
     pixels_of,
@@ -106,11 +107,9 @@ def reference(
     """
     files = [Path(path) for path in several(merge)]
     budgets = {"samples": samples, "error": error, "seconds": seconds}
-    given = [name for name, value in budgets.items() if value is not None]
     if files:
-        others = [*given, *(["cluster"] if cluster else []), *(["change"] if change else [])]
-        if others:
-            raise InputError(f"merge: traces nothing; leave out {', '.join(others)}")
+        of_tracing = {"size": size, "seed": seed or None, "orders": orders, "cluster": cluster, "change": change}
+        exclude("merge", "traces nothing", {**budgets, **of_tracing, "pixel": pixel != "centre"})
         return _merged(str(scene), files)
     if estimator not in _ESTIMATORS:
         raise InputError(
@@ -135,8 +134,8 @@ def reference(
                 f"pixel: got {pixel!r}, but {estimator} traces pixel centres; leave it out or take quadrature"
             )
         budget = _budget(budgets, usual=USUAL_SAMPLES if wanted is None else USUAL_CLOUD_SAMPLES)
-    elif given:
-        raise InputError(f"{given[0]}: is for {', '.join(_ESTIMATORS[1:])}; leave it out, or take one of these")
+    else:
+        exclude("quadrature", "draws no samples", {**budgets, "seed": seed or None})
     changes = changes_of(change)
     from reports.machine.environment import activate
 

@@ -22,6 +22,7 @@ from reports.api.inputs import (
     Size,
     Values,
     changes_of,
+    exclude,
     kernel_name,
     note,
     one_error,
@@ -206,16 +207,16 @@ def _check(
     for name, value in (("samples", samples), ("frames", frames)):
         if value is not None and value < 1:
             raise InputError(f"{name}: got {value}, expected 1 or more")
-    if plan and (files or frames is not None or samples > 1 or timed):
-        raise InputError("plan: renders nothing; leave out what is about an image")
+    if plan:
+        beside = {"output": files, "frames": frames, "samples": samples > 1, "timed": timed}
+        exclude("plan", "renders nothing", beside)
     if animate is not None and frames is None:
         raise InputError("animate: got no number of frames; add frames, such as --frames 24")
     if frames is not None and not files:
         raise InputError("frames: got no place for the files; add an output, such as -o NAME.exr or -o NAME.png")
-    if frames is not None and samples > 1:
-        raise InputError("samples: got frames too, expected one of them: animations have one ray a pixel")
-    if frames is not None and timed:
-        raise InputError("timed: got frames too, expected one of them: an animation says what its frames cost")
+    if frames is not None:
+        single = {"samples": samples > 1, "timed": timed}
+        exclude("frames", "an animation has one ray a pixel and says what its frames cost", single)
     for path in files:
         if path.suffix.lower() not in _ENDINGS:
             raise InputError(

@@ -20,9 +20,9 @@ from reports.api.inputs import (
     Progress,
     Scenes,
     Values,
+    exclude,
     note,
     one_error,
-    only_from,
     several,
     telling,
 )
@@ -187,10 +187,10 @@ def report(
     if from_ is not None:
         beside = {"quick": quick, "full": full, "kernel": kernel, "set": settings, "images": images, "fresh": fresh}
         shown = {"a scene": scenes, "method": method} if figures is None else {}
-        only_from("report", "measures nothing", {**beside, "cluster": cluster, **shown})
+        exclude("from", "the report is drawn again", {**beside, "cluster": cluster, **shown})
         return _redrawn(Path(from_), output, figures, several(scenes), [str(each) for each in several(method)])
-    if quick and full:
-        raise InputError("report: got both quick and full; give one of them, or neither for the default")
+    if quick:
+        exclude("quick", "is one effort", {"full": full})
     effort = "quick" if quick else "full" if full else "default"
     target = Path(FOLDER if output is None else output)
     asked = (several(scenes), several(method), several(kernel), settings)
@@ -256,6 +256,7 @@ def _measured(
 
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):
+        exclude(asked[0], "the study says how much is measured", {effort: effort != "default"})
         study, asked = read_study(Path(asked[0])), []
     names, shown = _scenes_of_images(asked, images, tuple(study.scene_names()))
     chosen, apart = asked_configurations(methods, kernels, settings, usual=study.configurations)

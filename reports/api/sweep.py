@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from reports.api.inputs import File, Progress, one_error, only_from, telling
+from reports.api.inputs import File, Progress, exclude, one_error, telling
 from reports.tables.record import Result, Said
 
 if TYPE_CHECKING:
@@ -112,8 +112,7 @@ def sweep(
 
     require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
-        beside = {"a study": study, "cluster": cluster}
-        only_from("sweep", "computes nothing", beside)
+        exclude("from", "computes no cells", {"the study": study, "cluster": cluster})
         return _findings(Path(from_), None if output is None else Path(output))
     from reports.cluster.connect import parse_place
     from validation.study.rows import RowStore
