@@ -187,18 +187,18 @@ def _elsewhere(
     orders: str | None,
 ) -> Any:
     """Let workers compute what is not in the cache: a quadrature at once, batches as they are asked for."""
-    from reports.cluster.references import Picture, bring_references, tracing
+    from reports.cluster.references import bring_references, image_of, tracing
     from validation.estimates.images import batch_plan, cloud_orders
 
     width, height = (int(side) for side in loaded.scene.sensors()[0].film().size())
-    picture = Picture.of(str(loaded.path.resolve() if loaded.path else loaded.name), (width, height), changes)
+    image = image_of(loaded, (width, height), changes)
     if budget is None:
-        bring_references(workers, [picture], pixel=pixel)
+        bring_references(workers, [image], pixel=pixel)
         return None
     batches, samples = batch_plan(budget, width * height)
     known = None if budget.samples is None else batches
     chosen = cloud_orders(orders) if orders else None
-    return tracing(workers, picture, estimator, samples=samples, batches=known, orders=chosen)
+    return tracing(workers, image, estimator, samples=samples, batches=known, orders=chosen)
 
 
 def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]) -> "Reference":

@@ -7,8 +7,8 @@ deliver, for any reason, are computed here.
 
 import pickle
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -22,41 +22,35 @@ from reports.cluster.connect import Client, facts
 from reports.cluster.run import Group, Task, run_groups
 from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
 from validation.estimates.quadrature import reference_image
-from validation.scenes.loading import load_scene
+from validation.scenes.changes import change_words
+from validation.scenes.loading import LoadedScene
+from validation.study.configuration import Configuration
+from validation.study.reference import load_cell
+from validation.study.study import Cell
 
 _LIMIT = 6 * 3600.0  # of a reference or a batch [s]
 _WAVE = 8  # batches that are asked for at once by worker, where their number is not known before
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A scene as workers load it."""
-
-    scene: str  #: name or path
-    size: tuple[int, int] | None  #: [pixels]
-    changes: tuple[tuple[str, tuple[float, ...]], ...] = ()  #: of the scene, as of `--change`
-
-    @classmethod
-    def of(cls, scene: str, size: tuple[int, int] | None, changes: Mapping[str, Sequence[float]]) -> "Picture":
-        """Return the picture that `load_scene` would load."""
-        return cls(scene, size, tuple((name, tuple(values)) for name, values in changes.items()))
-
-    def load(self):
-        """Return the `mi.Scene`."""
-        return load_scene(self.scene, self.size, dict(self.changes)).scene
+def image_of(
+    loaded: LoadedScene, size: tuple[int, int], changes: Mapping[str, Sequence[float]] = MappingProxyType({})
+) -> Cell:
+    """Return the image of a scene as a cell, which workers load by the name or path of the scene."""
+    name = str(loaded.path.resolve()) if loaded.path else loaded.name
+    return Cell(name, size, tuple(change_words(changes)), Configuration("reference"))
 
 
-def bring_references(cluster: Client, pictures: Sequence[Picture], **how: Any) -> None:
-    """Let workers compute the quadrature references of scenes that are not in the cache, and keep them here.
+def bring_references(cluster: Client, images: Sequence[Cell], **how: Any) -> None:
+    """Let workers compute the quadrature references of images that are not in the cache, and keep them here.
 
     `how`: arguments of `validation.estimates.quadrature.reference_image`.
     """
-    lacking = [picture for picture in pictures if not reference_image.is_kept(picture.load(), **how)]
-    named = {f"reference {number}": picture for number, picture in enumerate(lacking)}
+    lacking = [image for image in images if not reference_image.is_kept(load_cell(image).scene, **how)]
+    named = {f"reference {number}": image for number, image in enumerate(lacking)}
     given = how, fresh_since()
-    groups = [Group((Task(name, _reference, (picture, *given), _LIMIT),)) for name, picture in named.items()]
+    groups = [Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()]
     for name, value in _done(cluster, groups):
-        reference_image.keep(*value, named[name].load(), **how)
+        reference_image.keep(*value, load_cell(named[name]).scene, **how)
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
@@ -70,7 +64,7 @@ def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]
 
 def tracing(
     cluster: Client,
-    picture: Picture,
+    image: Cell,
     estimator: str,
     *,
     samples: int,
@@ -83,7 +77,7 @@ def tracing(
     The rest is as for `validation.estimates.monte_carlo.monte_carlo_batches`.
     """
     # As bytes, by which a worker knows again what it has prepared.
-    kind = pickle.dumps((picture, estimator, {"samples": samples, "orders": orders, "counts": counts}))
+    kind = pickle.dumps((image, estimator, {"samples": samples, "orders": orders, "counts": counts}))
 
     def bring(seeds: list[int]) -> Iterator[tuple[Batches, Spent]]:
         # One task in a group: what is sent at once then depends on the workers alone.
@@ -94,13 +88,13 @@ def tracing(
     return bring, batches or _WAVE * max(1, workers)
 
 
-def spread(cluster: Client, picture: Picture) -> ElsewhereFor:
+def spread(cluster: Client, image: Cell) -> ElsewhereFor:
     """Return the function that lets workers trace the batches that check a reference."""
-    return lambda estimator, samples, counts: tracing(cluster, picture, estimator, samples=samples, counts=counts)
+    return lambda estimator, samples, counts: tracing(cluster, image, estimator, samples=samples, counts=counts)
 
 
-def _reference(picture: Picture, how: Mapping[str, Any], since: float | None) -> tuple[ReferenceImage, Spent]:
-    scene, spent = picture.load(), stopwatch()
+def _reference(image: Cell, how: Mapping[str, Any], since: float | None) -> tuple[ReferenceImage, Spent]:
+    scene, spent = load_cell(image).scene, stopwatch()
     with fresh_results(since):
         return reference_image(scene, **how), spent()
 
@@ -112,5 +106,5 @@ def _batch(kind: bytes, seed: int) -> tuple[Batches, Spent]:
 
 @lru_cache(maxsize=1)
 def _tracer(kind: bytes) -> Trace:
-    picture, estimator, given = pickle.loads(kind)
-    return batch_tracer(picture.load(), estimator, **given)[1]
+    image, estimator, given = pickle.loads(kind)
+    return batch_tracer(load_cell(image).scene, estimator, **given)[1]

@@ -34,8 +34,7 @@ from reports.report.others import other_parts, paper_rows, spans_of
 from reports.report.scene import folder_of, write_scene
 from validation.columns import record_of
 from validation.scenes.loading import scene_stem
-from validation.scenes.random.design import is_random
-from validation.scenes.registry import FOG_SCENES, SCENES
+from validation.scenes.registry import FOG_SCENES
 from validation.study.configuration import Configuration
 from validation.study.run import PROBE, Apart, frame_of
 from validation.study.scene import SceneStudy, open_scene, study_scene
@@ -43,7 +42,6 @@ from validation.study.study import STUDIES, Cell, Study, standard_study
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Client
-    from reports.cluster.references import Picture
     from validation.engine.images import EngineImage
     from validation.estimates.monte_carlo import ElsewhereFor
     from validation.study.scene import Judged
@@ -84,7 +82,7 @@ def write_report(
         environment["opengl"] = require_opengl()
     process = in_own_process if apart else None
     seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
-    since, notes, of_scenes, pictures = time.time() if fresh else None, list[str](), [], []
+    since, notes, of_scenes, referenced = time.time() if fresh else None, list[str](), [], list[Cell]()
 
     def opened(name: str) -> SceneStudy:
         return open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine())
@@ -94,7 +92,10 @@ def write_report(
             each = opened(name)
             notes += each.scene.features.notes
             of_scenes.append(each.seconds())
-            pictures.append(_picture(each, each.size))
+            if cluster is not None:
+                from reports.cluster.references import image_of
+
+                referenced.append(image_of(each.loaded, each.size))
         noted(notes)
     # Not before the scenes are known to be right: a mistake leaves no empty folder.
     target = ensure_folder(folder)
@@ -107,7 +108,7 @@ def write_report(
             if cluster is not None:
                 from reports.cluster.references import bring_references
 
-                bring_references(cluster, pictures, points=study.points)
+                bring_references(cluster, referenced, points=study.points)
             ended = _try_own(names[0], study, process) if names else {}
             for name, parts, span in zip(names, of_scenes, spans):
                 # One scene at a time: Mitsuba compiles a virtual call for the materials, media and lights of all scenes
@@ -195,17 +196,9 @@ def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None
     """Return the function that lets workers trace the batches that check the reference of a scene."""
     if cluster is None:
         return None
-    from reports.cluster.references import spread
+    from reports.cluster.references import image_of, spread
 
-    return spread(cluster, _picture(study, study.study.checks.size))
-
-
-def _picture(study: SceneStudy, size: tuple[int, int]) -> "Picture":
-    """Return a scene as workers load it."""
-    from reports.cluster.references import Picture
-
-    name = study.path
-    return Picture(name if name in SCENES or is_random(name) else str(Path(name).resolve()), size)
+    return spread(cluster, image_of(study.loaded, study.study.checks.size))
 
 
 def _try_own(scene: str, study: Study, apart: Apart | None) -> dict[Configuration, str]:
