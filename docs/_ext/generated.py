@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that are made from the program and from a report.
 
-A line `<!-- generated: NAME WORDS -->` of a page is replaced by Markdown that the function of that name in `listed`,
-`measured`, `shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. In a
-plain viewer the marks are invisible: `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages.
+A mark `*Generated: NAME WORDS*` of a page is replaced by Markdown that the function of that name in `listed`,
+`measured`, `shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. A plain
+viewer shows the marks; `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages.
 Links to Python files of the project, which have no pages, become the names of the files. A notebook is read as the
 Markdown of its cells and of what they printed and showed.
 """
@@ -20,7 +20,7 @@ from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
 ROOT = Path(__file__).resolve().parents[2]
-_MARK = re.compile(r"<!-- generated: ([a-z-]+)((?: [\w-]+)*) -->")
+_MARK = re.compile(r"\*Generated: ([a-z-]+)((?: [\w-]+)*)\*")
 _SOURCE = re.compile(r"\[([^\]]+)\]\(\.\./((?:analytic|realtime|reference|validation|reports)/[\w/]+)\.py\)")
 #: Documents in the folder above, and the pages that show them.
 _PAGES = {"../DESIGN.md": "conventions.md"}

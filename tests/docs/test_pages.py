@@ -42,7 +42,7 @@ def test_pages_build_and_load_nothing_from_a_network(tmp_path):
     assert len(pages) > 15
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        assert "<!-- generated" not in text, page.name
+        assert "Generated: " not in text, page.name
         loaded = Loaded()
         loaded.feed(text)
         for address in loaded.resources:
