@@ -2,10 +2,10 @@
 """Parts of pages that are made from the program and from a report.
 
 A mark `*Generated: NAME WORDS*` of a page is replaced by Markdown that the function of that name in `listed`,
-`measured`, `shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. A plain
-viewer shows the marks; `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages.
-Links to Python files of the project, which have no pages, become the names of the files. A notebook is read as the
-Markdown of its cells and of what they printed and showed.
+`measured`, `shown` or `tested` returns, before the page is read, so that nothing on the pages is copied by hand. A
+plain viewer shows the marks; `.venv/bin/python -m sphinx -W --keep-going docs airlight-docs` builds the pages. Links to
+Python files of the project, which have no pages, become the names of the files. A notebook is read as the Markdown of
+its cells and of what they printed and showed.
 """
 
 import json

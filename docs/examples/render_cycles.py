@@ -9,17 +9,22 @@ The interpreter needs the module `bpy` (`pip install bpy==5.0.1` for Python 3.11
 `blender --background --python render_cycles.py -- sphere-spot.json ...`. With `--layers` the file is Blender's
 multi-layer EXR, whose layer `ViewLayer.Volume Direct` is the airlight. Rendered with Blender 5.0.1.
 
-The description has every number as a property of `bpy`; this file creates what is listed there and assigns it.
+`cycles_properties.py` gives every number as a property of `bpy`; this file creates what is listed there and assigns it.
 """
 
 import argparse
 import json
 import sys
 from functools import reduce
+from pathlib import Path
 from typing import Any
 
 import bpy
 from mathutils import Matrix
+
+sys.path.insert(0, str(Path(__file__).parent))  # Blender's `--python` does not look there
+
+from cycles_properties import cycles_properties
 
 FILTERS = {"box": "BOX", "blackman-harris": "BLACKMAN_HARRIS"}
 
@@ -46,9 +51,9 @@ def main() -> None:
 
 
 def read(path: str) -> dict[str, Any]:
-    """Return the description of Cycles that `describe` gives."""
+    """Return the properties of a scene that `describe` printed."""
     with open(path, encoding="utf-8") as stream:
-        return json.load(stream)["properties"]["Cycles"]
+        return cycles_properties(json.load(stream))
 
 
 def build(properties: dict[str, Any], gltf: str) -> None:

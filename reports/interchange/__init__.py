@@ -4,7 +4,6 @@
 Read in this order:
 
 - `scene.py`: a scene in numbers
-- `cycles.py`: these numbers as properties of Blender's module `bpy`
 - `meshes.py`: its shapes as triangles
 - `gltf.py`: the scene as glTF
 - `fog_grid.py`: height fog as a grid of densities

@@ -13,7 +13,6 @@ from reference.scene.camera import camera_matrix
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
 from reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
-from reports.interchange.cycles import cycles_properties
 from validation.scenes.engine_fog import ENGINES, parameters_of
 from validation.scenes.loading import LoadedScene, scene_stem
 from validation.scenes.random.design import is_random
@@ -50,10 +49,9 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
     or a medium.
 
     These are `scene`, `source`, `purpose`, `up`, `handedness`, `camera`, `medium`, `bounded_media`, `lights`,
-    `surfaces`, `radiance`, `notes`, `file`, and `properties`, the scene as `cycles_properties` returns it;
-    of a random scene also `drawn`. Lengths in metres, angles in degrees, extinction in 1/m, intensity in W/sr, power in
-    W. Black shapes of area lights are among the lights, not the surfaces. A scene without a reference is refused, with
-    what is in the way.
+    `surfaces`, `radiance`, `notes` and `file`, of a random scene also `drawn`. Lengths in metres, angles in degrees,
+    extinction in 1/m, intensity in W/sr, power in W. Black shapes of area lights are among the lights, not the
+    surfaces. A scene without a reference is refused, with what is in the way.
     """
     notes = read_scene(loaded.scene).features.notes  # it refuses what `render` refuses, in its words
     scene = read_reference(loaded.scene)
@@ -85,7 +83,7 @@ def describe_scene(loaded: LoadedScene) -> dict[str, Any]:
         },
     }
     drawn = {"drawn": drawn_values(loaded.name)} if loaded.path is None and is_random(loaded.name) else {}
-    return described | drawn | {"properties": {"Cycles": cycles_properties(described)}}
+    return described | drawn
 
 
 def up_axis(up: Array) -> str:

@@ -53,7 +53,6 @@ def _rows(described: Mapping[str, Any]) -> Iterator[Cells]:
         yield from _block("drawn", described["drawn"])
     yield "pixels", "", described["radiance"]
     yield from _block("file to write", described["file"])
-    yield "in Blender", "", "--json has `properties`: all of this by the names of Blender's Python"
 
 
 def _block(what: str, part: Mapping[str, Any]) -> Iterator[Cells]:

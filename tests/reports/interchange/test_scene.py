@@ -3,6 +3,8 @@
 
 import json
 import math
+import runpy
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -19,6 +21,9 @@ from tests.helpers.height_fog import LAMP, fog_xml
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import FOG_SCENES
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
+cycles_properties = runpy.run_path(str(EXAMPLES / "cycles_properties.py"))["cycles_properties"]
 
 
 def described(**changes):
@@ -137,7 +142,7 @@ def test_every_built_in_scene_can_be_described_and_written(name, variant, tmp_pa
 
 def properties(**changes):
     described = describe_scene(LoadedScene("tiny", mi.load_dict(tiny_scene(**changes)), "A tiny scene.", ""))
-    return described, described["properties"]["Cycles"]
+    return described, cycles_properties(described)
 
 
 def test_a_camera_looks_along_minus_z_and_cuts_no_fog_away(variant):
@@ -178,7 +183,7 @@ def test_media_have_coefficients_and_the_sign_of_g(variant):
         "Absorption Coefficients": described["medium"]["sigma_a"],
         "Anisotropy": -0.37,
     }
-    three = describe_scene(load_scene("three-media", (8, 6)))["properties"]["Cycles"]
+    three = cycles_properties(describe_scene(load_scene("three-media", (8, 6))))
     assert three["world"] is None
     assert len(three["media"]) == 3
 

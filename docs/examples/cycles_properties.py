@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene as properties of `bpy`, Blender's module: all that Cycles needs besides the meshes.
+"""The description of a scene as properties of `bpy`, Blender's module: all that Cycles needs besides the meshes.
 
-Every number that a script would have to know is here, so that it knows nothing: it creates what is listed and assigns
-the properties by their names, see docs/examples/render_cycles.py. Blender 5.0.1 was tried.
+`render_cycles.py` creates what is listed here and assigns the properties by their names. Blender 5.0.1 was tried.
 """
 
 import math
