@@ -389,27 +389,11 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
 
 def _plan(asked: _Asked) -> "Said":
     """Return the features that a scene needs."""
-    from realtime.methods.registry import find_method
-    from realtime.methods.shadow_planes.method import ShadowPlanes, occluders_in_words
-    from realtime.parameters import values
-    from realtime.scene.light_samples import with_light_samples
     from realtime.scene.read_scene import describe
     from reports.tables.record import Said
-    from validation.study.configuration import prepared
 
     loaded, read = asked.read()
-    words, notes = describe(read.features), tuple(read.features.notes)
-    method, seen = find_method(asked.chosen.method), read
-    if read.area_lights:
-        own: dict[str, Any] = {
-            name: value for name, value in asked.chosen.parameters if name in values(method.light_samples)
-        }
-        points = replace(method.light_samples, **own)
-        words["light samples"] = f"{points.points} of each area light, {points.pattern}"
-        seen = with_light_samples(read, 1, "ring")  # the occluders as the middle of each sees them
-    if issubclass(method, ShadowPlanes):
-        words |= occluders_in_words(seen)
-        _warnings(prepared(read, asked.chosen))
+    words, notes = describe(read.features), read.features.notes
     lines = [*(f"{name}: {said}" for name, said in words.items()), *notes]
     return Said(name=loaded.name, data={"plan": words, "notes": list(notes)}, lines=lines)
 

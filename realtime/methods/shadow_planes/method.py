@@ -31,7 +31,7 @@ import mitsuba as mi
 
 from realtime.errors import InputError
 from realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
-from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes, light_basis, shadow_planes
+from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
 from realtime.methods.shadow_planes.published_mesh import (
     check_vertices,
@@ -41,7 +41,7 @@ from realtime.methods.shadow_planes.published_mesh import (
     surface_gamma,
     visible_triangle,
 )
-from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring, silhouette
+from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
 from realtime.numerics.array_types import ArrayTypes, host_numbers, types_of
 from realtime.parameters import parameter
@@ -334,33 +334,6 @@ def _segments(view: View, index: PlaneIndex, rays: RayPlanes, airlight: LitRays,
     zero = airlight.nothing(dr.width(view.distance))
     value, reached = sum_lit_intervals(index, rays, airlight.segment(view.distance), integral, zero)
     return airlight.radiance(value), reached
-
-
-def occluders_in_words(scene: Scene) -> dict[str, str]:
-    """Return the kinds of occluders and the planes that the camera needs, one entry for each decision.
-
-    Raises InputError for an occluder without triangles.
-    """
-    occluders = with_positions(read_occluders(scene.geometry, scene.area_lights), scene.positions)
-    if not len(occluders.triangles):
-        return {"occluders": "none: no silhouettes, no planes; one integral a ray and light"}
-    components = len(occluders.closed)
-    words = {
-        "shadows": "silhouettes and planes: no shadow rays",
-        "occluders": f"{len(occluders.shapes)} shapes, {len(occluders.triangles)} triangles in {components} parts, "
-        f"{occluders.closed.sum()} closed",
-    }
-    camera = read_camera(scene.camera)
-    for number, light in enumerate(scene.lights, 1):
-        position = host_position(light)
-        used = _used_components(occluders, camera, position, scene.source_shape(light))
-        basis, every = light_basis(position, camera.origin), len(silhouette(occluders, position).edges)
-        planes = len(shadow_planes(occluders, silhouette(occluders, position, used=used), basis).first)
-        out = components - int(used.sum())
-        left = f"{out} parts left out, their shadows miss the view" if out else "every part's shadow can be seen"
-        name = "planes" if len(scene.lights) == 1 else f"planes of light {number}"
-        words[name] = f"{planes} of {every} silhouette edges; {left}"
-    return words
 
 
 def _used_components(occluders: Occluders, camera: HostCamera, position: Any, own: str | None) -> Any:

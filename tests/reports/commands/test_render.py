@@ -71,13 +71,9 @@ def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, 
 
 
 @pytest.mark.claim("flawed-meshes-warn")
-def test_plan_counts_occluders_and_warns_of_open_ones_where_planes_have_an_order_of_a_paper(variant, capfd):
-    run("sphere-spot", *SMALL, "--method", "shadow-planes", "--plan", "--json")
-    out, err = capfd.readouterr()
-    assert "airlight: warning:" not in err
-    run("sphere-spot", *SMALL, "--method", "shadow-planes", "--set", "order=paper", "--plan", "--json")
+def test_open_occluders_are_warned_of_where_planes_have_an_order_of_a_paper(variant, capfd):
+    run("sphere-spot", *SMALL, "--method", "shadow-planes")
+    assert "airlight: warning:" not in capfd.readouterr().err
+    run("sphere-spot", *SMALL, "--method", "shadow-planes", "--set", "order=paper")
     err = capfd.readouterr().err
-    words = json.loads(out)["plan"]
-    assert words["occluders"].startswith("2 shapes, 1090 triangles")
-    assert "silhouette edges" in words["planes"]
     assert err.count("airlight: warning: shape 'floor' is open") == 1
