@@ -20,5 +20,5 @@ Read in this order:
 - `noise.py`: independent runs of methods that draw random numbers;
 - `motion.py`: methods under a light that moves, frame by frame;
 - `ladders.py`: a scene with less and more of one kind of work, meshes with four times the triangles among it;
-- `growth.py`: the exponents with which times grow with the work, and errors with the size of the shadow map.
+- `growth.py`: the exponents with which times grow with the work.
 """
