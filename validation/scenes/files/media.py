@@ -5,11 +5,9 @@ Files of Mitsuba 0.5 and 0.6, and of its descendants, give scattering and absorp
 
     sigma_t = sigma_s + sigma_a,        albedo = sigma_s / sigma_t,
 
-or the name of a material. The scale, which multiplies both, stays as it is.
+or the name of a material, which is refused. The scale, which multiplies both, stays as it is.
 """
 
-import tomllib
-from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -90,30 +88,17 @@ def pass_where_no_material(state: Any) -> None:
 
 
 def _refuse_names(props: Any) -> None:
-    """Refuse the name of a material, and a density, with the numbers to write where these are known."""
-    name, material, density = f"medium '{props.id()}'", str(props.get("material", "")), _numbers(props, "density")
-    times = np.ones(3) if density is None else density
-    if not material and density is not None:
-        extinction = _numbers(props, "sigma_t")
-        product = "" if extinction is None else f': <rgb name="sigma_t" value="{_words(extinction * times)}"/>'
+    """Refuse the name of a material of Mitsuba 0.6, and a density."""
+    name = f"medium '{props.id()}'"
+    if "material" in props:
+        raise InputError(
+            f"{name} names the material '{props['material']}'; expected its sigma_t [1/m] and albedo in numbers"
+        )
+    if "density" in props:
         raise InputError(
             f"{name} has a density, which a homogeneous medium has not; expected sigma_t [1/m] and albedo: multiply "
-            f"sigma_t by the density and remove it{product}"
+            "sigma_t by the density and remove it"
         )
-    if not material:
-        return
-    materials = tomllib.loads(Path(__file__).with_name("materials.toml").read_text(encoding="utf-8"))
-    known = materials.get(material.lower().replace(" ", "").replace("_", ""))
-    remedy = "its sigma_t [1/m] and albedo in numbers"
-    if known is not None:
-        scattering, absorption = map(np.array, known)
-        sigma_t = scattering + absorption
-        remedy = (
-            f'<rgb name="sigma_t" value="{_words(sigma_t * times)}"/> and <rgb name="albedo" '
-            f'value="{_words(scattering / sigma_t)}"/> (per mm; the scale multiplies it)'
-        )
-    named = f"the material '{material}' of Mitsuba 0.6" + ("" if density is None else " and a density")
-    raise InputError(f"{name} names {named}; expected {remedy} in {'its' if density is None else 'their'} place")
 
 
 def _extinction(props: Any) -> tuple[Array, Array]:
