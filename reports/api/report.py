@@ -190,7 +190,7 @@ def report(
         exclude("from", "the report is drawn again", {**beside, "cluster": cluster, **shown})
         return _redrawn(Path(from_), output, figures, several(scenes), [str(each) for each in several(method)])
     if quick:
-        exclude("quick", "is one effort", {"full": full})
+        exclude("quick", "names the effort", {"full": full})
     effort = "quick" if quick else "full" if full else "default"
     target = Path(FOLDER if output is None else output)
     asked = (several(scenes), several(method), several(kernel), settings)

@@ -105,39 +105,30 @@ def _rectangle() -> tuple[Array, Index, None]:
 
 
 def _disk() -> tuple[Array, Index, None]:
-    i = np.arange(SIDES)
-    fan = np.stack([np.full(SIDES, SIDES), i, (i + 1) % SIDES], axis=1)
-    return np.concatenate([_circle(), np.zeros((1, 3))]), fan, None
+    return *_revolved([(1, 0), (0, 0)]), None
 
 
 def _cylinder() -> tuple[Array, Index, Array]:
     """Return the side of the cylinder from z = 0 to 1; Mitsuba's has no ends."""
-    circle = _circle()
-    vertices = np.concatenate([circle, circle + np.array([0.0, 0, 1])])
-    return vertices, _band(0, SIDES), np.concatenate([circle, circle])
+    vertices, faces = _revolved([(1, 0), (1, 1)])
+    return vertices, faces, vertices * [1, 1, 0]
 
 
 def _sphere() -> tuple[Array, Index, Array]:
-    rings = SIDES // 2
-    polar = np.pi * np.arange(1, rings) / rings
-    circle = _circle()
-    rows = [np.sin(angle) * circle - np.array([0, 0, np.cos(angle)]) for angle in polar]
-    vertices = np.concatenate([*rows, [[0.0, 0, -1], [0, 0, 1]]])
-    bands = [_band(ring * SIDES, (ring + 1) * SIDES) for ring in range(rings - 2)]
-    i = np.arange(SIDES)
-    j = (i + 1) % SIDES
-    south, north, top = np.full(SIDES, len(vertices) - 2), np.full(SIDES, len(vertices) - 1), (rings - 2) * SIDES
-    ends = [np.stack([south, j, i], axis=1), np.stack([north, top + i, top + j], axis=1)]
-    return vertices, np.concatenate([*bands, *ends]), vertices
+    polar = np.pi * np.arange(SIDES // 2 + 1) / (SIDES // 2)
+    vertices, faces = _revolved(np.stack([np.sin(polar), -np.cos(polar)], axis=1))
+    return vertices, faces, vertices
 
 
-def _circle() -> Array:
+def _revolved(profile: Any) -> tuple[Array, Index]:
+    """Return the surface that points (radius, z) sweep about the z axis, seen from outside where z grows."""
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
-    return np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
-
-
-def _band(low: int, high: int) -> Index:
-    """Return the triangles between two rings, the upper one further along z, seen from outside."""
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(SIDES)], axis=1)
+    vertices = np.concatenate([radius * circle + [0, 0, z] for radius, z in profile])
     i = np.arange(SIDES)
     j = (i + 1) % SIDES
-    return np.concatenate([np.stack([low + i, low + j, high + j], 1), np.stack([low + i, high + j, high + i], 1)])
+    band = np.concatenate([np.stack([i, j, SIDES + j], 1), np.stack([i, SIDES + j, SIDES + i], 1)])
+    faces = np.concatenate([band + ring * SIDES for ring in range(len(profile) - 1)])
+    corners = vertices[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return vertices, faces[area > 1e-9]  # half of the triangles at a pole have none

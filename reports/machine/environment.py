@@ -9,6 +9,7 @@ import importlib
 import os
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -188,11 +189,13 @@ def threads() -> int:
 
 
 def processor() -> str:
-    """Return the processor's name."""
+    """Return the processor's name, by /proc/cpuinfo if that exists."""
     import platform
 
-    lines = _cpuinfo("model name")
-    return lines or platform.processor() or platform.machine()
+    named = ""
+    with suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
+        named = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    return named or platform.processor() or platform.machine()
 
 
 @cache
@@ -246,16 +249,3 @@ def machine_in_words(environment: Mapping[str, Any]) -> str:
     """Return the machine in a line, from `describe_environment`: the GPU first, if there is one."""
     device = f"{environment['device']}, " if environment.get("device") else ""
     return f"{device}{environment['processor']}, {environment['threads']} threads, {environment['variant']}"
-
-
-def _cpuinfo(key: str) -> str:
-    """Return the first value of a key of /proc/cpuinfo, read no further than that."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
-            for line in lines:
-                name, _, value = line.partition(":")
-                if name.strip() == key:
-                    return value.strip()
-    except OSError:
-        pass
-    return ""

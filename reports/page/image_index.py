@@ -30,13 +30,13 @@ from reports.page.image_codec import (
     reference_codes,
     reference_values,
 )
+from validation.metrics.errors import FLOOR
 
 Array = NDArray[np.float64]
 
 LAYERS = ("airlight", "surface")
 FLIP_LAYER = "flip"
 FLIP_LEVELS = 255  #: code of an HDR-FLIP of 1
-DARK = 1e-3  #: fraction of the reference's mean; darker pixels are compared with this floor, as in the tables
 STRIDES = (1, 2, 3, 4, 6, 8, 12, 16)  #: of the pixels that are kept
 
 
@@ -166,4 +166,4 @@ def _floor(reference: Array | None) -> float:
         return 1.0
     finite = np.isfinite(reference)
     mean = float(reference[finite].mean()) if finite.any() else 0.0
-    return DARK * mean if mean > 0 else 1.0
+    return FLOOR * mean if mean > 0 else 1.0

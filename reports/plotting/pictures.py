@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from reference.storage.files import write_bytes
 from validation.metrics.colour import auto_exposure
+from validation.metrics.errors import FLOOR
 
 Colours = NDArray[np.uint8]
 
@@ -132,7 +133,7 @@ def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Pict
     finite = np.isfinite(reference) & np.isfinite(test)
     mean = float(reference[finite].mean()) if finite.any() else 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
-        relative = (test - reference) / np.maximum(reference, 1e-3 * mean)
+        relative = (test - reference) / np.maximum(reference, FLOOR * mean)
     # Equal values have no error, also where both are black and the mean is 0.
     relative = np.where(finite & (test != reference), relative, 0)
     worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[..., 0]

@@ -67,7 +67,7 @@ MISTAKES = (
     ("study scaling open-fog --kinds triangles", "0 triangles"),
     ("study methods open-fog --method froxel-fog --set slice=9", "did you mean 'slices'"),
     ("study slabs", 'Did you mean "slab"'),
-    ("report --quick --full", "quick: is one effort; leave out full"),
+    ("report --quick --full", "quick: names the effort; leave out full"),
     ("report --quick hal", "did you mean 'hall'"),
     ("report --quick open-fog --set steps=3", "set: got no single method"),
     ("report open-fog --method ray-march --set step=3", "did you mean 'steps'"),
