@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The diagnosis of an image of a scene: every fault predicts the image that it would make, and the data choose.
 
-Faults are tried alone, those that need paths of their own only where no other one explains the image, then pairs of
+Faults are tried alone, those that need their own paths only where no other one explains the image, then pairs of
 different kinds. Whether pixels are centres or means is decided once, by what the faults without paths of their own
 leave of the image.
 """

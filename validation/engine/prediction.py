@@ -204,7 +204,7 @@ class Predictor:
         parts = []
         for layer, scenery in enumerate((guess.scenery, guess.surfaces or guess.scenery)):
             held = self.seen.holds != ("surface", "airlight")[layer]
-            # Where surfaces have scenery of their own, a light that moves with its paths held moves for the fog alone.
+            # Where surfaces have their own scenery, a light that moves with its paths held moves for the fog alone.
             fog = replace(guess.fog, moved=self.fog.moved) if layer == 1 and guess.surfaces else guess.fog
             parts.append(self.light.radiance(self.seen, scenery, fog, layer) if held else None)
         airlight, surface = (np.zeros((len(self.pixels), 3)) if part is None else part for part in parts)

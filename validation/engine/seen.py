@@ -216,7 +216,7 @@ def relative_errors(predicted: Array, shown: Array, floor: float) -> Array:
 def needed_samples(reference: ReferenceScene) -> int:
     """Return how many samples stand for an area light: twice as many until the image hardly changes.
 
-    A window before pillars needs 128 where a lamp above an edge needs 16: each sample has shadows of its own.
+    A window before pillars needs 128 where a lamp above an edge needs 16: each sample has its own shadows.
     """
     samples, fog = SAMPLES, scene_fog(reference)
     if not reference.area:

@@ -7,7 +7,7 @@ wrote. It attenuates over a shadow ray that ends a relative epsilon before the l
 compared with the quadrature image of *that* integral, exp(-sigma_t (x + (1 - epsilon) r)), with the epsilon measured on
 this machine. The bias without this correction is given beside it.
 
-Under area lights the quadrature has standard errors of its own, and both sides' count. All its pixels share the points
+Under area lights the quadrature has its own standard errors, and both sides' count. All its pixels share the points
 of the lights, so that their errors add up: the interval of the image takes the spread of its replicates' means, as it
 takes that of whole batches of the samplers. volpath's light comes in part by rays that the phase function sends on,
 which are not shortened: the bias that is corrected for is the most that the epsilon can do, and the one without
@@ -38,7 +38,7 @@ from validation.statistics.comparison import Estimate, compare_statistics
 from validation.statistics.records import Agreement, Statistics
 
 MASK_PIXELS = 2.0
-#: The least margin under area lights, where the quadrature has errors of its own: 3.4e-4 of the mean airlight of
+#: The least margin under area lights, where the quadrature has its own errors: 3.4e-4 of the mean airlight of
 #: `penumbra-plane`, 8e-4 with the factor of Student's law for eight replicates. No batch makes it less.
 WIDE_MARGIN = 0.0025
 _LEAST_BATCHES = 32  # below, the standard error of a standard error exceeds 13 %

@@ -76,7 +76,7 @@ def monte_carlo_batches(
     `samples` a pixel; the first has the seed `first_seed`, the others count up. For volpath alone there are
     `max_depth`, the most edges of a path (`reference.monte_carlo.volpath.volpath_batch`), and `counts`,
     samples of each pixel in each batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.allocation`).
-    `orders` are names of disjoint sets of orders of scattering, '3-4', each with a layer of its own: for a scene of
+    `orders` are names of disjoint sets of orders of scattering, '3-4', each with its own layer: for a scene of
     clouds, by 'volpath' or 'cloud-paths'.
 
     `enough` is asked after every block, whose last seed is one less than a multiple of eight, whether to stop; `go_on`
@@ -89,7 +89,7 @@ def monte_carlo_batches(
     if batches > LARGEST_SEED:
         raise InputError(
             f"samples: got {batches * samples} a pixel, in {batches} batches of {samples}; expected at most "
-            f"{LARGEST_SEED * samples}: each batch has a seed of its own"
+            f"{LARGEST_SEED * samples}: each batch has its own seed"
         )
     if not 0 <= first_seed <= LARGEST_SEED - batches:
         raise InputError(

@@ -125,7 +125,7 @@ def reference_layer(reference: ReferenceImage, layer: str, *, emitted: bool = Tr
 def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
     """Return the standard error of a layer, (height, width, 3) [W/(m^2 sr)]; None without area lights, where it is 0.
 
-    Airlight and surface have draws of their own, so that the variances of the total add up; what lights emit is exact.
+    Airlight and surface have their own draws, so that the variances of the total add up; what lights emit is exact.
     """
     if reference.airlight_se is None or reference.surface_se is None:
         return None

@@ -133,7 +133,7 @@ def _unanswerable(ref: Array, tst: Array) -> str:
 
 
 def _in_child(inputs: dict[str, Any]) -> NDArray[np.float32] | str:
-    """Run FLIP in a process of its own; return its map, or what went wrong."""
+    """Run FLIP in a separate process; return its map, or what went wrong."""
     with temporary_folder() as folder:
         input_file, map_file = folder / "inputs.npz", folder / "map.npy"
         np.savez(input_file, **inputs)

@@ -150,7 +150,7 @@ def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise
     """Return the noise with what several runs tell, from their relative errors as they are and blurred."""
     count = len(errors)
     if (errors[1:] == errors[0]).all():
-        raise InputError("runs: all are the same, bit by bit; expected renders with a seed of their own each")
+        raise InputError("runs: all are the same, bit by bit; expected renders with different seeds")
     flat = errors.reshape(count, -1)
     squared_bias, variance = parts_of_error(flat @ flat.T / flat.shape[1])
     biases = flat.mean(axis=1)

@@ -69,7 +69,7 @@ def run(
     Scene and reference are of the same image, at the size of the cell; without a reference nothing is compared. Frames
     are timed in `timed_scene` where that is given. `whole` is the `mi.Scene` that both were read from: without it no
     error is held against what the method states. `paint` makes the picture of the row, and `apart` calls a user's
-    method in a process of its own. The row lacks what only the caller knows: key, study, origin.
+    method in a separate process. The row lacks what only the caller knows: key, study, origin.
     """
     took = stopwatch()
     runs: list[Array] = []

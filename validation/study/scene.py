@@ -200,7 +200,7 @@ def study_scene(
 ) -> SceneResult:
     """Return the results of a study for a scene.
 
-    `images` from elsewhere are judged. `apart` calls a user's method in a process of its own; configurations that
+    `images` from elsewhere are judged. `apart` calls a user's method in a separate process; configurations that
     `ended` such a process before, with how, are not called again. `progress` is called with the name of each part, as
     of `SceneStudy.seconds`, before it begins. `spread` lets other processes trace the batches that check the reference.
     `workers` is the number of processes that compute HDR-FLIP at once, each on one processor.
@@ -217,7 +217,7 @@ def study_scene(
     for chosen in study.configurations:
         progress(chosen.label)
         rows.append(_row(study, chosen, apart, ended or {}))
-    # Nothing is timed any more: FLIP, which runs on one processor in a process of its own, may have all of them.
+    # Nothing is timed any more: FLIP, which runs on one processor in a separate process, may have all of them.
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
     rows += [_image(study, shown) for shown in images]

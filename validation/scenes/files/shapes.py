@@ -180,7 +180,7 @@ def _shine_alike(shape: Any, matrices: list[Array]) -> bool:
 
 
 def _write_rectangles(state: Any, index: int, matrices: list[Array]) -> None:
-    """Put rectangles in the place of a lamp: the first in its node, each with an emitter of its own."""
+    """Put rectangles in the place of a lamp: the first in its node, each with its own emitter."""
     name = properties(state, index).id()
     parts = list(references(properties(state, index)))
     for number, matrix in enumerate(matrices):
