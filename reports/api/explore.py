@@ -16,6 +16,7 @@ from reports.api.inputs import (
     Size,
     Values,
     changes_of,
+    exclude,
     kernel_name,
     note,
     one_error,
@@ -147,7 +148,15 @@ def view(
         raise InputError(f"address: got {address!r}, expected HOST:PORT, a port from 0, any free one, to 65535")
     from validation.study.configuration import Configuration, configuration
 
-    chosen = method if isinstance(method, Configuration) else configuration(method, kernel_name(kernel), parameters)
+    if isinstance(method, Configuration):
+        exclude(
+            "method",
+            "a configuration has its own kernel and parameters",
+            {"kernel": kernel, **dict.fromkeys(parameters, True)},
+        )
+        chosen = method
+    else:
+        chosen = configuration(method, kernel_name(kernel), parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()
     from reports.view.server import Server

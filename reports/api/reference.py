@@ -109,7 +109,8 @@ def reference(
     budgets = {"samples": samples, "error": error, "seconds": seconds}
     if files:
         of_tracing = {"size": size, "seed": seed or None, "orders": orders, "cluster": cluster, "change": change}
-        exclude("merge", "traces nothing", {**budgets, **of_tracing, "pixel": pixel != "centre"})
+        others = {"pixel": pixel != "centre", "estimator": estimator != "quadrature"}
+        exclude("merge", "traces nothing", budgets | of_tracing | others)
         return _merged(str(scene), files)
     if estimator not in _ESTIMATORS:
         raise InputError(

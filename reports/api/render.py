@@ -158,8 +158,12 @@ def render(
     from reports.machine.environment import activate
 
     activate()  # a user's module may need a variant when it is imported
+    from realtime.methods.shader.source import is_shader
+
     named = checked_configuration(method, kernel, parameters)
     chosen, apart = named
+    if is_shader(chosen.method):
+        exclude("method", "a shader computes in float32", {"precision": precision != "single"})
     asked = _Asked(scene, pixels_of(size), changes_of(change), precision, chosen, run, frame)
     shown = progress if isinstance(progress, bool) else None
     call: Any = operator.call
@@ -188,6 +192,11 @@ class _Asked:
     chosen: "Configuration"
     run: int
     frame: int
+
+    @property
+    def random(self) -> dict[str, int | None]:
+        """The numbers that decide the random numbers of a frame, None for 0."""
+        return {"run": self.run or None, "frame": self.frame or None}
 
     def read(self) -> tuple[Any, Any]:
         """Return the scene, loaded, and as methods read it."""
@@ -235,9 +244,8 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
     from validation.study.configuration import Configuration, configuration
 
     if isinstance(method, Configuration):
-        given = [name for name, value in (("kernel", kernel), ("parameters", parameters)) if value]
-        if given:
-            raise InputError(f"{' and '.join(given)}: a configuration has its own; leave that out")
+        beside = {"kernel": kernel, **dict.fromkeys(parameters or (), True)}
+        exclude("method", "a configuration has its own kernel and parameters", beside)
         return method, method.own
     if isinstance(method, str) and is_shader(method):
         require_opengl()
@@ -260,6 +268,8 @@ def _ready(asked: _Asked, frames: int, layers: bool, progress: Progress) -> tupl
     note(progress, read.features.notes)
     layered = layers and find_method(asked.chosen.method).renders_clouds
     made = prepared(read, asked.chosen, extra_layers=layered)
+    if not made.method.noisy:
+        exclude("method", f"{asked.chosen.label} draws no random numbers", asked.random)
     return loaded, read, replace(made, run=asked.run, frame=asked.frame), layered
 
 
