@@ -205,14 +205,14 @@ def _elsewhere(
 def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]) -> "Reference":
     from reports.api.results import Reference, sealed
     from reports.report.scene import reference_record
-    from validation.estimates.images import whole_reference
+    from validation.estimates.images import layered_reference
     from validation.estimates.quadrature import reference_image
 
     found = reference_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
     said = reference_record(found)
     return Reference(
         scene=loaded.name,
-        image=sealed(whole_reference(loaded, found, pixel=pixel)),
+        image=sealed(layered_reference(loaded, found, pixel=pixel)),
         estimator="quadrature",
         relative_error=float("nan") if said.relative_bound is None else said.relative_bound,
         how=said,
@@ -267,11 +267,4 @@ def _merged(scene: str, files: list[Path]) -> "Reference":
 def _budget(given: dict[str, Any], *, usual: int) -> "Budget":
     from validation.estimates.images import Budget
 
-    named = [name for name, value in given.items() if value is not None]
-    if len(named) > 1:
-        raise InputError(f"{' and '.join(named)} exclude each other; give one of them")
-    for name in named:
-        kind, words = (int, "a whole number") if name == "samples" else (int | float, "a number")
-        if not isinstance(given[name], kind) or not given[name] > 0:
-            raise InputError(f"{name}: got {given[name]!r}, expected {words} above 0")
-    return Budget(samples=given["samples"] if named else usual, error=given["error"], seconds=given["seconds"])
+    return Budget(**({"samples": usual} if all(value is None for value in given.values()) else given))

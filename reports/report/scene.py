@@ -35,7 +35,7 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
     light = reference.airlight + reference.surface
     factor = exposure(light)
     pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(reference.airlight, factor)}
-    named = files.written(_REFERENCE, layered_reference(study.name, reference), pictures)
+    named = files.written(_REFERENCE, layered_reference(study.loaded, reference), pictures)
     stems = file_stems([judged.row.label for judged in result.rows])
     return Scene(
         name=study.name,

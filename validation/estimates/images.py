@@ -57,30 +57,25 @@ class Budget:
     seconds: float | None = None  #: of the whole run; batches from the cache cost next to nothing
 
     def __post_init__(self) -> None:
-        given = {"--samples": self.samples, "--error": self.error, "--seconds": self.seconds}
-        named = [f"{name} {value:g}" for name, value in given.items() if value is not None]
-        if len(named) != 1:
-            raise InputError(f"got {' and '.join(named) or 'none'} of {', '.join(given)}; give one of them")
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        if len(given) != 1:
+            what = f"{' and '.join(given)} exclude each other" if given else "a budget of nothing"
+            raise InputError(f"{what}; give one of {', '.join(vars(self))}")
         for name, value in given.items():
-            if value is not None and not 0 < value < np.inf:
-                raise InputError(f"{name}: got {value:g}, expected a positive number")
+            kind, words = (int, "a whole number") if name == "samples" else (int | float, "a number")
+            if not isinstance(value, kind) or not 0 < value < np.inf:
+                raise InputError(f"{name}: got {value!r}, expected {words} above 0")
         if self.error is not None and self.error >= 1:
-            raise InputError(f"--error: got {self.error:g}, expected less than 1; 0.01 is 1 %")
+            raise InputError(f"error: got {self.error:g}, expected less than 1; 0.01 is 1 %")
 
 
-def whole_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: str = "centre") -> Image:
+def layered_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: str = "centre") -> Image:
     """Return the quadrature reference of a loaded scene as layers; the header says of which bytes of the scene."""
-    image = layered_reference(loaded.name, reference)
-    made = {"airlight:pixel": pixel, "airlight:scene_digest": scene_digest(loaded.scene)}
-    return replace(image, attributes=dict(image.attributes) | made)
-
-
-def layered_reference(name: str, reference: ReferenceImage) -> Image:
-    """Return the quadrature reference of the scene of that name as layers."""
     layers = {"airlight": reference.airlight, "airlight_bound": reference.airlight_bound, "surface": reference.surface}
     extent = {"airlight_se": reference.airlight_se, "surface_se": reference.surface_se, "emitted": reference.emitted}
     layers |= {layer: values for layer, values in extent.items() if values is not None}
-    made: dict[str, str | int | float] = {"airlight:scene": name, "airlight:estimator": "quadrature"}
+    made: dict[str, str | int | float] = {"airlight:scene": loaded.name, "airlight:estimator": "quadrature"}
+    made |= {"airlight:pixel": pixel, "airlight:scene_digest": scene_digest(loaded.scene)}
     if reference.airlight_se is not None:
         made["airlight:batches"] = REPLICATES
     return Image(layers, reference.distance, made)

@@ -21,7 +21,7 @@ from validation.estimates.agreement import layer_masks, reference_estimate
 from validation.estimates.images import layered_reference
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer, reference_of_pixels
-from validation.scenes.loading import load_scene
+from validation.scenes.loading import LoadedScene, load_scene
 from validation.statistics.comparison import Estimate, compare_statistics
 
 
@@ -93,7 +93,7 @@ def test_reference_of_an_area_light_goes_on_where_it_was_interrupted(own_cache, 
     counted.clear()
     assert_same(reference_image(scene), again)
     assert len(counted) == went_on + 1
-    image = layered_reference("lamp", again)
+    image = layered_reference(LoadedScene("lamp", scene, "", ""), again)
     assert {"emitted", "airlight_se", "surface_se", "airlight_bound"} <= set(image.layers)
     assert image.attributes["airlight:batches"] == 8
 
