@@ -27,6 +27,7 @@ from validation.clock import time_repeated, timed
 from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene, resize
+from validation.scenes.parts import light
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
 from validation.study.frame_times import moved_light
@@ -107,13 +108,8 @@ def table_scene(name: str, size: tuple[int, int]) -> Any:
         return load_scene(name, size).scene
     described = SCENES["colonnade"].build()
     lamp = described["lamp"]
-    described["lamp"] = {
-        "type": "spot",
-        "to_world": mi.ScalarTransform4f().look_at(lamp["position"], [-1.13, 0.97, 1.67], [0, 0, 1]),
-        "cutoff_angle": 56.7,
-        "beam_width": 56.7,
-        "intensity": lamp["intensity"],
-    }
+    cone = {"position": lamp["position"], "target": [-1.13, 0.97, 1.67], "cutoff": 56.7, "beam": 56.7}
+    described["lamp"] = light("spot", lamp["intensity"]["value"], **cone)
     scene = mi.load_dict(described)
     resize(scene, size)
     return scene

@@ -28,7 +28,7 @@ from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.metrics.errors import error_metrics, known
 from validation.scenes.loading import load_scene, resize
-from validation.scenes.parts import camera
+from validation.scenes.parts import camera, fog, point_light
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, prepared
 
@@ -56,8 +56,8 @@ def multiple_scattering() -> dict[str, Any]:
 def _left_over(name: str) -> float:
     scene = load_scene(name, _SIZE).scene
     first, second = (_multiple(scene, seed) for seed in (0, 1000))
-    fog = _fog(read_scene(scene))
-    return left_over(first, second, fitted_constant(fog, 0.5 * (first + second)) * fog)
+    ambient = _ambient(read_scene(scene))
+    return left_over(first, second, fitted_constant(ambient, 0.5 * (first + second)) * ambient)
 
 
 def fitted_constant(fog: Array, multiple: Array) -> float:
@@ -82,7 +82,7 @@ def _multiple(scene: Any, seed: int) -> Array:
     return whole - single
 
 
-def _fog(scene: Scene) -> Array:
+def _ambient(scene: Scene) -> Array:
     """Return the ambient fog of constant 1, (pixels, 3), as the method draws it."""
     lit, unlit = (
         render_frame(prepared(scene, configuration("shadow-planes", "exact", values))).airlight.astype(np.float64)
@@ -121,17 +121,11 @@ def constant_distance(image: tuple[int, int] = (64, 48)) -> dict[str, float]:
 def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) -> dict[str, Any]:
     """Return a sphere of fog as high as the view, and a lamp at radius/size from its centre."""
     lamp = _LAMP / np.linalg.norm(_LAMP) * (_RADIUS / size)
-    medium = {
-        "type": "homogeneous",
-        "sigma_t": 1.0,
-        "scale": 0.5 * optical_depth / _RADIUS,
-        "albedo": 0.83,
-        "has_spectral_extinction": False,
-    }
+    medium = fog(0.5 * optical_depth / _RADIUS, (0.83, 0.83, 0.83))
     return {
         "type": "scene",
         "sensor": camera((0.13, -5.3, 0.21), (0.0, 0.0, 0.0), fov=27.1, size=image, in_fog=False),
-        "lamp": {"type": "point", "position": lamp.tolist(), "intensity": {"type": "rgb", "value": [3.1, 3.1, 3.1]}},
+        "lamp": point_light(lamp.tolist(), (3.1, 3.1, 3.1)),
         "ball": {"type": "sphere", "radius": _RADIUS, "bsdf": {"type": "null"}, "interior": medium},
     }
 
