@@ -43,7 +43,6 @@ _MOVED = 0.02  # fraction by which the error changes where a search left the unc
 _LESS = 0.9  # fraction of the error that a search leaves of which all digits are wanted where paths cost much
 # Errors over the least one that more digits do not bring down to it; the last where that one leaves noise.
 _FAR, _FAR_OF_PATHS, _FAR_FROM_NOISE = 10.0, 3.0, 1.5
-_MANY_TRIANGLES = 20_000  # of which paths cost much: few pixels are looked at
 _PARTNERS = 12  # faults, those that leave least, with which all others are tried as pairs
 _PAIRS = 12  # pairs that are followed, those that leave least where they begin
 _BETTER = 0.7  # what a pair must leave of the error of one alone: with more numbers anything fits a little better
@@ -196,9 +195,8 @@ class _Attempt:
     """The search among all faults, with pixels of one kind."""
 
     def __init__(self, predictor: Predictor, pixel: str, progress: Progress | None) -> None:
-        shapes = predictor.reference.occluders.shapes()
-        self.many = sum(shape.primitive_count() for shape in shapes) >= _MANY_TRIANGLES
-        self.predictor = predictor.coarse if self.many else predictor
+        self.many = predictor.many
+        self.predictor = predictor.few if self.many else predictor
         self.pixel, self.progress = pixel, progress
         self.little = no_fault(predictor.reference)
         self.right = explain(self.predictor, ())

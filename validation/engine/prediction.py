@@ -21,6 +21,8 @@ Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfa
 
 APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _FEW_RAYS = 800  # with which faults that move paths are told apart
+_MANY_TRIANGLES = 20_000  # of which exact paths cost much: few pixels are looked at, and faults are searched by others
+_STEPS = 64  # shadow rays that find the lit parts of a ray there
 _SPHERE_SAMPLES = 32  # of a sphere in the place of a point light
 _BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
 _SMOOTH = 40  # of the width of an image: the width of the filter for that light
@@ -150,7 +152,7 @@ class SceneLight:
 
 def _sight(seen: Seen) -> tuple[Any, ...]:
     """Return the key of the paths of an image: all that its pixels depend on."""
-    return seen.area, seen.holds, seen.samples, seen.rays, seen.used.tobytes(), seen.cut_off.tobytes()
+    return seen.area, seen.holds, seen.samples, seen.rays, seen.steps, seen.used.tobytes(), seen.cut_off.tobytes()
 
 
 @dataclass
@@ -172,9 +174,19 @@ class Predictor:
         return scene_fog(self.seen.reference)
 
     @cached_property
-    def coarse(self) -> "Predictor":
+    def many(self) -> bool:
+        """Whether a scene has so many triangles that exact paths cost much."""
+        return sum(shape.primitive_count() for shape in self.reference.occluders.shapes()) >= _MANY_TRIANGLES
+
+    @cached_property
+    def few(self) -> "Predictor":
         """One with fewer pixels."""
         return Predictor(replace(self.seen, rays=_FEW_RAYS), self.shape, self.light)
+
+    @cached_property
+    def coarse(self) -> "Predictor":
+        """One with fewer pixels, and where exact paths cost much with shadow rays."""
+        return Predictor(replace(self.few.seen, steps=_STEPS), self.shape, self.light) if self.many else self.few
 
     @cached_property
     def view(self) -> View:

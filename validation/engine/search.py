@@ -67,8 +67,10 @@ def explain(
     wrong fault.
     """
     # Faults that move paths, which are found again for each value, are tried on few pixels first to tell faults apart.
-    moves = any(parameter.step for fault in faults for parameter in fault.parameters)
-    sought = [predictor.coarse if moves else predictor, *[predictor] * fine]
+    coarse = _coarse(predictor, faults)
+    sought = [coarse, *[predictor] * fine]
+    if predictor.many and not fine:
+        predictor = coarse
     searches = [_Search(each, tuple(faults)) for each in sought]
     search = searches[0]
     parameters = search.parameters
@@ -100,9 +102,15 @@ def explain(
 
 def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[Values, ...]]:
     """Return the least mean error at the starts of some faults together, and the values there."""
+    predictor = _coarse(predictor, faults) if predictor.many else predictor
     starts = _starts(predictor, faults)
     left = [float(np.abs(predictor.errors(guess_of(predictor, faults, start))).mean()) for start in starts]
     return min(left), _parted(faults, starts[int(np.argmin(left))])
+
+
+def _coarse(predictor: Predictor, faults: Sequence[Fault]) -> Predictor:
+    moves = any(parameter.step for fault in faults for parameter in fault.parameters)
+    return predictor.coarse if moves else predictor
 
 
 def guess_of(predictor: Predictor, faults: Sequence[Fault], values: Values) -> Guess:

@@ -48,6 +48,7 @@ class Seen:
     area: bool = False  #: whether a pixel is a mean over its area, or the value at its centre
     samples: int = SAMPLES  #: that stand for an area light, see `needed_samples`
     rays: int = _MOST_RAYS  #: that a diagnosis looks at, at most
+    steps: int = 0  #: shadow rays that find the lit parts of a ray; 0: they are exact
 
     def view(
         self, *, most: int, apart: int = 0, offset: tuple[float, float] = (0.0, 0.0), zoom: float = 1.0, seed: int = 0
@@ -64,7 +65,8 @@ class Seen:
             if apart:
                 pixels = self._with_partners(pixels[::2], apart)
             pixels = np.union1d(pixels, self.cut_off[_evenly(len(self.cut_off), count / int(self.used.sum()))])
-        return view_of(self.reference, pixels, rays_per_side=_SIDE if self.area else 0, offset=offset, zoom=zoom)
+        side = _SIDE if self.area else 0
+        return view_of(self.reference, pixels, rays_per_side=side, offset=offset, zoom=zoom, steps=self.steps)
 
     @cached_property
     def cut_off(self) -> Index:

@@ -12,18 +12,19 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.quadrature.light_airlight import lit_rays
+from reference.quadrature.light_airlight import LitRays, lit_rays
 from reference.quadrature.replicates import PointPlan, square_points
 from reference.quadrature.shared_samples import shared_samples
 from reference.quadrature.surface import surface_hits
 from reference.scene.area_light import ReferenceAreaLight, is_area
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.device import as_rows, vectors
+from reference.scene.device import as_rows, on_device, vectors
 from reference.scene.directional_light import DirectionalLight, is_directional
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.shapes import read_shapes
 from reference.scene.varying import HeightMedium
 from reference.visibility.candidates import Ball
+from reference.visibility.certificate import LitIntervals
 from reference.visibility.distances import exact_distance
 from reference.visibility.lit_intervals import before_light, obstacles
 from validation.arrays import Array, Bools, Index
@@ -35,7 +36,7 @@ Light = ReferenceLight | DirectionalLight
 Ends = tuple[float, float, str]
 
 SAMPLES = 16  #: of an area light
-_FEW = 1000  # rays
+_BEFORE = 1 - 1e-4  # fraction of the way to a light that a shadow ray goes
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class View:
     interaction: Any  #: Mitsuba's, at the surfaces
     shapes: Any  #: the shapes that shadow
     length: Array  #: of the rays up to the surfaces in each medium, (rays, media) [m]
+    steps: int = 0  #: shadow rays that find the lit parts of a ray, an end to half a step; 0: they are exact
     _found: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def ends(self, ends: Ends) -> tuple[Array, Array]:
@@ -67,34 +69,46 @@ class View:
 
         def found() -> Any:
             reference, shapes = self.reference, self.shapes
+            empty = self._once("empty", lambda: mi.load_dict({"type": "scene"}))
             if not shadows:
-                reference, shapes = replace(reference, occluders=mi.load_dict({"type": "scene"})), None
+                reference, shapes = replace(reference, occluders=empty), None
             elif area is not None:
                 reference, shapes = self._once(("before", area.name), lambda: before_light(reference, area))
+            if self.steps and shadows and not isinstance(light, DirectionalLight):
+                whole = lit_rays(replace(reference, occluders=empty), light, self.distance, checks=0)
+                return self._tested(whole, light, reference.occluders)
             # Intervals by geometry are what they are: random checks only say how far to trust them.
-            if isinstance(light, DirectionalLight):
-                return lit_rays(reference, light, self.distance, shapes=shapes, checks=0)
-            ball = self._ball(light, area)
-            key = "near", ball.centre.tobytes(), ball.radius, shadows, None if area is None else area.name
-            known = self._once(key, lambda: obstacles(reference, ball, self.distance, shapes))
-            return lit_rays(reference, light, self.distance, known=known, checks=0)
+            known = None
+            if area is not None and not isinstance(light, DirectionalLight):  # shapes are searched once for all samples
+                ball = Ball(area.centre, area.radius)
+                known = self._once(
+                    ("near", area.name, shadows), lambda: obstacles(reference, ball, self.distance, shapes)
+                )
+            return lit_rays(reference, light, self.distance, shapes=shapes, known=known, checks=0)
 
         return self._once(("reach", _place_of(light), shadows, None if area is None else area.name), found)
 
-    def _ball(self, light: ReferenceLight, area: ReferenceAreaLight | None) -> Ball:
-        """Return the bounds of a light and of others that are asked for: shapes near rays are searched once for all.
-
-        This takes a millisecond a ray, which the places of a light that moves are worth where rays are few.
-        """
-        if area is not None:
-            return Ball(area.centre, area.radius)
-        if not light.cosine and len(self.distance) > _FEW:
-            return Ball(light.position)
-        centre = min(
-            (own.position for own in self.reference.lights), key=lambda place: np.linalg.norm(light.position - place)
-        )
-        away = float(np.linalg.norm(light.position - centre))
-        return Ball(centre, 4.0 ** np.ceil(np.log2(away) / 2 - 1e-9) if away > 0 else 0.0)
+    def _tested(self, reach: LitRays, light: ReferenceLight, occluders: Any) -> LitRays:
+        """Return the lit parts of rays by shadow rays from the middles of equal angles at the light."""
+        rays, ray = reach.rays, reach.lit.ray
+        if not len(ray):
+            return reach
+        low, high = (rays.theta(x, ray)[:, None] for x in (reach.lit.low, reach.lit.high))
+        steps = self.steps // 4 if light.cosine else self.steps  # many samples of a light smooth its shadows
+        theta = low + (high - low) * np.arange(2 * steps + 1) / (2 * steps)
+        x = rays.distance(theta, ray[:, None])
+        x[:, 0], x[:, -1] = reach.lit.low, reach.lit.high
+        place = rays.origin + x[:, 1::2, None] * rays.direction[ray, None]
+        way = (light.position - place).reshape(-1, 3)
+        far = np.linalg.norm(way, axis=1)
+        towards = way / np.maximum(far, np.finfo(float).tiny)[:, None]
+        shadow_ray = mi.Ray3f(vectors(mi.Point3f, place.reshape(-1, 3)), vectors(mi.Vector3f, towards))
+        shadow_ray.maxt = on_device(mi.Float, _BEFORE * far)
+        lit = ~np.array(occluders.ray_test(shadow_ray), dtype=bool).reshape(-1, steps)
+        beside = np.pad(lit, ((0, 0), (1, 1)))
+        row, first = np.nonzero(lit & ~beside[:, :-2])
+        last = np.nonzero(lit & ~beside[:, 2:])[1]
+        return replace(reach, lit=LitIntervals(ray[row], x[row, 2 * first], x[row, 2 * last + 2]))
 
     def reflected(self, light: Light, *, shadows: bool) -> tuple[Array, Bools]:
         """Return f cos at the surfaces towards a light, (rays, 3), and which of them it reaches, (rays,)."""
@@ -141,13 +155,14 @@ def view_of(
     rays_per_side: int = 0,
     offset: tuple[float, float] = (0.0, 0.0),
     zoom: float = 1.0,
+    steps: int = 0,
 ) -> View:
     """Return the rays of some pixels.
 
     `pixels`: numbers of the pixels, row by row; all by default; `rays_per_side`: 0: one ray through the centre of each
     pixel. n: n x n rays, one through the middle of each cell of a grid, whose mean is that over the pixel; `offset`:
     moves all rays on the film, to the right and down [pixels]; `zoom`: factor on the distance of all rays from the
-    middle of the film, before they are moved.
+    middle of the film, before they are moved; `steps`: see `View`.
     """
     size = reference.width, reference.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
@@ -160,7 +175,7 @@ def view_of(
     length[~np.isfinite(distance), 0] = np.inf
     owner = np.repeat(np.arange(len(pixels)), max(1, rays_per_side) ** 2)
     axis = camera_matrix(reference.scene.sensors()[0])[:3, 2]
-    return View(rays, pixels, owner, axis, distance, hits.interaction, shapes, length)
+    return View(rays, pixels, owner, axis, distance, hits.interaction, shapes, length, steps)
 
 
 def _positions(centres: Array, rays_per_side: int) -> Array:

@@ -76,7 +76,7 @@ def test_an_injected_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody
 @pytest.mark.slow
 def test_a_light_that_is_off_is_named_among_many_triangles(reference, monkeypatch):
     """There less is tried, since paths cost much."""
-    monkeypatch.setattr("validation.engine.diagnose._MANY_TRIANGLES", 0)
+    monkeypatch.setattr("validation.engine.prediction._MANY_TRIANGLES", 0)
     (injected,) = (each for each in INJECTED if each.name == "light-position")
     diagnosis = diagnosed(injected.image(reference))
     assert diagnosis.first == "light-position"
