@@ -33,7 +33,7 @@ from reports.api.inputs import (
 )
 
 if TYPE_CHECKING:
-    from reports.api.results import Rendering
+    from reports.api.results import RenderedFrames, Rendering
     from reports.api.scenes import OpenScene
     from reports.tables.record import Said
     from validation.study.configuration import Configuration
@@ -92,7 +92,7 @@ def render(
     timed: bool = False,
     progress: Progress = None,
     **parameters: Any,
-) -> "Rendering | Said":
+) -> "Rendering | RenderedFrames | Said":
     """Render a frame or an animation; say what a frame costs.
 
     An animation is one turn: lights circle, objects turn, the medium's density swings, colours rotate. Each frame
@@ -318,13 +318,15 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     )
 
 
-def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None, progress: Progress) -> "Said":
+def _animation(
+    asked: _Asked, files: list[Path], frames: int, moves: str | None, progress: Progress
+) -> "RenderedFrames":
     """Render the frames of an animation and write each as soon as it is done."""
     import time
 
     import numpy as np
 
-    from reports.api.results import frames_written, write_image
+    from reports.api.results import RenderedFrames, write_image
     from reports.machine.environment import activate
     from reports.plotting.pictures import tone_curve
     from validation.scenes.animation import animate, frame_changes, frame_objects, moved_parts, parse_moves
@@ -361,7 +363,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
         for written in _write_frames(path, loaded.name, changes_by_frame, shapes)
     ]
     moving, rendering = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
-    return frames_written(
+    return RenderedFrames(
         scene=loaded.name,
         method=chosen.label,
         size=(read.camera.width, read.camera.height),
@@ -369,6 +371,7 @@ def _animation(asked: _Asked, files: list[Path], frames: int, moves: str | None,
         moves=tuple(animation.moves),
         move_ms=moving,
         render_ms=rendering,
+        frame_ms=moving + rendering,
         recordings={stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in _STAGES},
         device=variant,
         files=(*(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)), *about),

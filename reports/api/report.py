@@ -342,13 +342,14 @@ def diff(
     """
     from reports.data.reader import read_report
     from reports.diff.compare import compare_reports, difference_lines, difference_tables
+    from validation.columns import plain
 
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
     found = compare_reports(*reports, time_tolerance=tolerance)
     return Said(
         name=f"{new} against {old}",
-        data=found.to_json(),
+        data=plain(found),
         tables=difference_tables(found),
         lines=difference_lines(found),
         good=not found.worse,

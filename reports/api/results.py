@@ -31,7 +31,7 @@ from reports.plotting.pictures import (
     write_png,
 )
 from reports.tables.methods import rate_words
-from reports.tables.record import Result, Said
+from reports.tables.record import Result
 from validation.columns import plain
 from validation.estimates.images import MonteCarloReference
 from validation.timing import FrameTimes
@@ -296,26 +296,40 @@ class Reference(LayeredImage):
         return f"{self.scene}, the reference by {self.estimator}"
 
 
-def frames_written(*, moves: Sequence[str], size: tuple[int, int], files: Sequence[str], **known: Any) -> Said:
-    """Return the frames of an animation, which were written as files, and what they cost.
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RenderedFrames(Result):
+    """The frames of an animation, which were written as files, and what they cost."""
 
-    `known` has the `scene`, the `method`, the number of `frames`, the medians `move_ms` and `render_ms` of the frames
-    after the first, `recordings`, how often each stage was compiled, and the `device`.
-    """
-    move, rendering = known["move_ms"], known["render_ms"]
-    frame = move + rendering
-    title = f"{known['scene']}, {known['method']}: {known['frames']} frames, {' and '.join(moves)} moving"
-    lines = [
-        title,
-        f"  {frame:.3g} ms a frame ({rate_words(frame)}): {move:.3g} ms to move, {rendering:.3g} ms to render, reusing "
-        f"what stood still; {known['device']}",
-    ]
-    for ending in dict.fromkeys(Path(path).suffix for path in files):
-        own = [path for path in files if path.endswith(ending)]
-        pixels = f"{own[0]} to {own[-1]}: {len(own)} files, {' x '.join(map(str, size))} pixels"
-        lines.append(f"wrote {f'{own[0]}: what changes' if ending == '.json' else pixels}")
-    listed = {"size": list(size), "moves": list(moves), "files": list(files), "frame_ms": frame}
-    return Said(name=title, data=known | listed, lines=lines)
+    scene: str
+    method: str
+    moves: tuple[str, ...]
+    size: tuple[int, int]
+    frames: int
+    move_ms: float  #: median of the frames after the first, as are the other times
+    render_ms: float
+    frame_ms: float
+    recordings: Mapping[str, int]  #: how often each stage was compiled
+    device: str
+    files: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """The scene, the method, and what moves."""
+        return f"{self.scene}, {self.method}: {self.frames} frames, {' and '.join(self.moves)} moving"
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """The cost of a frame, and the files that were written."""
+        lines = [
+            self.title,
+            f"  {self.frame_ms:.3g} ms a frame ({rate_words(self.frame_ms)}): {self.move_ms:.3g} ms to move, "
+            f"{self.render_ms:.3g} ms to render, reusing what stood still; {self.device}",
+        ]
+        for ending in dict.fromkeys(Path(path).suffix for path in self.files):
+            own = [path for path in self.files if path.endswith(ending)]
+            pixels = f"{own[0]} to {own[-1]}: {len(own)} files, {' x '.join(map(str, self.size))} pixels"
+            lines.append(f"wrote {f'{own[0]}: what changes' if ending == '.json' else pixels}")
+        return lines
 
 
 def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, total: Array | None = None) -> None:

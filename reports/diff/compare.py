@@ -38,20 +38,10 @@ _BUSY = 1.25  # with a larger ratio of the quartiles the machine was not quiet
 class Difference:
     """All differences of two reports."""
 
-    findings: tuple[Finding, ...]
-    errors: int  #: numbers compared
+    worse: int  #: findings that make the comparison fail
+    findings: tuple[Finding, ...]  #: the worse ones first
+    errors_compared: int
     times: TimeComparison
-
-    @property
-    def worse(self) -> tuple[Finding, ...]:
-        """The findings that make the comparison fail."""
-        return tuple(finding for finding in self.findings if finding.verdict == "worse")
-
-    def to_json(self) -> dict[str, Any]:
-        """Return everything, ready for JSON."""
-        times = {name: value for name, value in asdict(self.times).items() if name != "findings"}
-        summary = {"worse": len(self.worse), "findings": [asdict(finding) for finding in self.findings]}
-        return summary | {"errors_compared": self.errors, "times": times}
 
 
 def compare_reports(
@@ -78,8 +68,8 @@ def compare_reports(
         findings += differences
         compared += count
     findings += [Finding("note", name, "", "the scene is new") for name in after if name not in before]
-    times = compare_times(old, new, tolerance=time_tolerance)
-    findings += [*times.findings, *_stability(old, new), *_growth(old, new)]
+    times, slower = compare_times(old, new, tolerance=time_tolerance)
+    findings += [*slower, *_stability(old, new), *_growth(old, new)]
     findings += _papers(old, new)
     if not compared and not times.compared:
         raise InputError(
@@ -87,7 +77,9 @@ def compare_reports(
             "give two reports of the same scenes with the same effort"
         )
     rank = {"worse": 0, "better": 1, "note": 2}
-    return Difference(tuple(sorted(findings, key=lambda finding: rank[finding.verdict])), compared, times)
+    findings.sort(key=lambda finding: rank[finding.verdict])
+    worse = sum(finding.verdict == "worse" for finding in findings)
+    return Difference(worse, tuple(findings), compared, times)
 
 
 # Errors, scene by scene and method by method
@@ -282,7 +274,7 @@ def difference_lines(difference: Difference) -> list[str]:
     return [
         *lines,
         _times_line(difference),
-        f"{len(difference.worse)} worse, {better} better, {difference.errors} errors compared",
+        f"{difference.worse} worse, {better} better, {difference.errors_compared} errors compared",
     ]
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The times of two reports compared, by the rules of `validation.statistics.noise`."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from reports.data.records import Report, Size
 from validation.statistics.noise import SHORTEST, Times, drift, least_ratio, slower_stages, spread
@@ -32,15 +32,14 @@ class TimeComparison:
     spread: float  #: upper over lower quartile, of the noisier report
     least: float  #: least ratio of two times that is significant
     drift: float  #: median ratio of all frames
-    findings: tuple[Finding, ...] = field(default=())
 
 
-def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeComparison:
-    """Compare the times of two reports; parameters as in `reports.diff.compare.compare_reports`."""
+def compare_times(old: Report, new: Report, *, tolerance: float | None) -> tuple[TimeComparison, list[Finding]]:
+    """Compare the times of two reports, with findings; parameters as in `reports.diff.compare.compare_reports`."""
     machine, changes = _machines(old, new)
     notes = [Finding("note", "", "", change) for change in changes]
     if tolerance is None:
-        return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0, tuple(notes))
+        return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0), notes
     if new.cached:
         notes.append(Finding("note", "", "", f"{new.cached} results of the new report were measured earlier and kept"))
     pairs, otherwise = _pairs(old, new)
@@ -51,7 +50,7 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> TimeC
     findings = [*notes, *_drift(common, least, machine, len(pairs))]
     for (scene, label), (old_times, new_times) in pairs.items():
         findings += _configuration(scene, label, old_times, new_times, least=least, common=common, machine=machine)
-    return TimeComparison(len(pairs), machine, changes, both, least, common, tuple(findings))
+    return TimeComparison(len(pairs), machine, changes, both, least, common), findings
 
 
 def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:

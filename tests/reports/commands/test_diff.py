@@ -14,8 +14,12 @@ def compare_reports(old, new):
     return compare.compare_reports(checked(old), checked(new))
 
 
+def found(difference, verdict="worse"):
+    return [finding for finding in difference.findings if finding.verdict == verdict]
+
+
 def words(difference, verdict="worse"):
-    chosen = [finding for finding in difference.findings if finding.verdict == verdict]
+    chosen = found(difference, verdict)
     return [" ".join(part for part in (finding.scene, finding.method, finding.what) if part) for finding in chosen]
 
 
@@ -104,13 +108,13 @@ def test_twice_the_time_is_found_on_a_quiet_machine():
         new = report(seed + 1)
         slow_down(method(new), 2.0)
         difference = compare_reports(report(seed), new)
-        assert {finding.method for finding in difference.worse} == {"shadow-planes (exact)"}
-        assert {finding.what for finding in difference.worse} >= {"frame [ms]", "airlight [ms]"}
+        assert {finding.method for finding in found(difference)} == {"shadow-planes (exact)"}
+        assert {finding.what for finding in found(difference)} >= {"frame [ms]", "airlight [ms]"}
 
 
 def test_another_machine_is_compared_beside_the_median_of_all():
     new = report(machine=2.0)
-    (finding,) = compare_reports(report(), new).worse  # the same machine: everything is slower, which is one finding
+    (finding,) = found(compare_reports(report(), new))  # the same machine: everything is slower, which is one finding
     assert "every frame" in finding.what
     assert finding.new == pytest.approx(2.0)
     new["environment"]["threads"] = 16
@@ -148,12 +152,12 @@ CHANGES = [
 def test_a_change_is_worse_one_way_and_not_the_other(change, expected):
     new = report()
     change(new)
-    found = words(compare_reports(report(), new))
+    worse = words(compare_reports(report(), new))
     if expected is None:
-        assert len(found) >= 1
+        assert len(worse) >= 1
     else:
-        assert found == expected
-    if found and "reference moved" not in found[0]:
+        assert worse == expected
+    if worse and "reference moved" not in worse[0]:
         assert words(compare_reports(new, report())) == []
 
 
