@@ -43,16 +43,6 @@ def new_figure(width: float, height: float) -> "Figure":
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def name_sizes(panel: "Axes", sizes: Iterable[float]) -> None:
-    """Name these sizes along the axis and nothing else: what lies between powers of ten would overlap."""
-    from matplotlib.ticker import FixedLocator, NullLocator
-
-    shown = sorted(set(sizes))
-    panel.xaxis.set_major_locator(FixedLocator(shown))
-    panel.xaxis.set_minor_locator(NullLocator())
-    panel.set_xticklabels([f"{size:g}" for size in shown])
-
-
 def picture_grid(pictures: Sequence[tuple[str, Any]], column: str, *, across: int = 3) -> "Figure":
     """Return a figure of pictures with titles, in rows of `across`, for a column, 'single' or 'double'.
 

@@ -7,6 +7,6 @@ Read in this order:
 - `methods.py`: methods timed and compared, errors by cause
 - `growth.py`: times and memory as the work grows
 - `kernels.py`: kernels timed, where they break, integrals of a file
-- `variation.py`: bias apart from noise, flicker and lag under a light that moves, estimators of transmittance
+- `variation.py`: bias apart from noise, flicker and lag under a light that moves
 - `clouds.py`: a slab by order of scattering
 """

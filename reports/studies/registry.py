@@ -117,7 +117,6 @@ STUDIES = {
     "integrals": "kernels",
     "noise": "variation",
     "motion": "variation",
-    "transmittance": "variation",
     "slab": "clouds",
 }
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Studies of errors that vary: from run to run, from frame to frame under a light that moves, from ray to ray."""
+"""Studies of errors that vary: from run to run, and from frame to frame under a light that moves."""
 
 import math
 from functools import partial
@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, pixels_of, telling, with_kernels
 from reports.machine.progress import counted
 from reports.studies.registry import FRACTION, Study, with_environment
-from reports.tables.table import Interval, numbers, table, table_of, words
+from reports.tables.table import Interval, numbers, table, words
 
 if TYPE_CHECKING:
-    from validation.estimates.transmittance import TransmittanceError
     from validation.study.motion import MethodMotion
     from validation.study.noise import MethodNoise
 
@@ -225,74 +224,4 @@ def _draw_motion(found: "list[MethodMotion]", column: str) -> Any:
     axes.set(xlabel="frame", ylabel="relative RMSE [1]")
     axes.set_yscale("symlog", linthresh=1e-6)
     axes.legend(loc="best")
-    return figure
-
-
-_STEPS = (2, 4, 8, 16, 32)  # of the marches
-_STYLES = {
-    "naive": ("vermillion", "o"),
-    "jackknife": ("green", "^"),
-    "unbiased-ray-marching": ("blue", "s"),
-    "ratio-tracking": ("purple", "D"),
-}
-
-
-@with_kernels
-def transmittance(scene: SceneLike = "smoke", *, progress: Progress = None) -> Study:
-    """Measure estimators of the transmittance of rays through a density grid.
-
-    Naive exponentials of a marched sum are too bright, by Jensen's inequality: the row gives the bias, and the bias
-    expected from the variance of the sum. Ratio tracking, unbiased ray marching and the jackknife are compared, too,
-    all against the exact optical depth, over 48 rays between random places of the grid.
-
-    Parameters
-    ----------
-    scene
-        A scene with a density grid around its camera.
-    progress
-        Called with (fraction done, what); True shows a bar.
-    """
-    from reference.scene.read import read_reference
-    from reports.api.scenes import opened
-    from validation.estimates.transmittance import TransmittanceError, transmittance_errors
-
-    with telling(progress, "rays") as tell:
-        read = read_reference(opened(scene, (8, 6)).scene)
-        rows = transmittance_errors(read, _STEPS, progress=tell)
-    title = f"{scene}: transmittance of 48 rays, relative to its mean"
-    data = with_environment(scene=str(scene), rows=rows)
-    how = dict.fromkeys(("bias", "bias_error", "jensen", "spread"), FRACTION)
-    drawn = table_of(title, TransmittanceError, rows, how=how)
-    return Study(
-        name="transmittance",
-        data=data,
-        tables=(drawn,),
-        rows=tuple(rows),
-        draw=partial(_draw_transmittance, rows),
-    )
-
-
-def _draw_transmittance(rows: "list[TransmittanceError]", column: str) -> Any:
-    """Return bias and spread over the look-ups; dotted, the brightening that Jensen's inequality predicts."""
-    from reports.plotting.figure import name_sizes, new_figure
-    from reports.plotting.style import COLOURS, WIDTHS
-
-    width, double = WIDTHS[column], column == "double"
-    figure = new_figure(width, (0.42 if double else 1.4) * width)
-    panels = figure.subplots(1, 2) if double else figure.subplots(2, 1)
-    for name, (colour, marker) in _STYLES.items():
-        own = [row for row in rows if row.estimator == name]
-        look_ups = [row.look_ups for row in own]
-        style: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "label": name}
-        panels[0].errorbar(look_ups, [abs(row.bias) for row in own], [2 * row.bias_error for row in own], **style)
-        panels[1].plot(look_ups, [row.spread for row in own], **style)
-    march = [row for row in rows if row.jensen is not None]
-    jensen = [row.look_ups for row in march], [row.jensen for row in march]
-    panels[0].plot(*jensen, color=COLOURS["vermillion"], linestyle=":", label="naive, by Jensen")
-    panels[0].set(ylabel="bias, absolute, relative to T [1]")
-    panels[1].set(ylabel="standard deviation, relative to T [1]")
-    for panel in panels:
-        panel.set(xlabel="look-ups a ray [1]", xscale="log", yscale="log")
-        name_sizes(panel, sorted({row.steps for row in march}))
-    panels[0].legend(loc="best")
     return figure

@@ -9,6 +9,5 @@ Read in this order:
 - `images.py`: references as layered images, and when a Monte Carlo run ends;
 - `merge.py`: references of several machines as one;
 - `agreement.py`: Monte Carlo estimators against the quadrature image;
-- `transmittance.py`: estimators of the transmittance of a ray, against the exact one;
 - `multiple_scattering.py`: the fraction of light that single scattering leaves out.
 """

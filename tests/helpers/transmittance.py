@@ -24,12 +24,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analytic.errors import InputError
 from reference.quadrature.fields import field_of
 from reference.scene.read import ReferenceScene
 from reference.scene.varying import GridMedium
 from validation.arrays import Array, Index
-from validation.columns import column
 
 Look = Callable[[Array], Array]  # fractions of a ray, any shape -> optical depth of the whole ray if all were as there
 
@@ -41,13 +39,13 @@ _RAYS, _TIMES = 48, 1024
 class TransmittanceError:
     """How wrong an estimator is along rays, relative to the mean transmittance of these."""
 
-    estimator: str = column()
-    steps: int = column(meaning="of a march, or how many times the majorant's optical depth")
-    look_ups: float = column("look-ups", meaning="of a ray, on the average")
-    bias: float = column()
-    bias_error: float = column("its error", meaning="standard error of the bias")
-    jensen: float | None = column("by Jensen", meaning="brightening by the variance of a march; None for others")
-    spread: float = column("std. dev.", meaning="root of the mean variance of one estimate")
+    estimator: str
+    steps: int  #: of a march, or how many times the majorant's optical depth
+    look_ups: float  #: of a ray, on the average
+    bias: float
+    bias_error: float  #: standard error of the bias
+    jensen: float | None = None  #: brightening by the variance of a march; None for others
+    spread: float  #: root of the mean variance of one estimate
 
 
 def marches(look: Look, random: np.random.Generator, times: int, steps: int) -> Array:
@@ -102,22 +100,13 @@ def ratio_tracking(look: Look, random: np.random.Generator, times: int, majorant
     return np.where(np.arange(most) < count[:, None], kept, 1.0).prod(axis=1), float(count.mean())
 
 
-def transmittance_errors(
-    reference: ReferenceScene,
-    steps: Sequence[int],
-    *,
-    progress: Callable[[float, str], None] | None = None,
-) -> list[TransmittanceError]:
+def transmittance_errors(reference: ReferenceScene, steps: Sequence[int]) -> list[TransmittanceError]:
     """Return how wrong the estimators are along rays through the grid of a scene, a row for each and its steps.
 
-    `steps`: of the marches; `progress`: called with (fraction done, what).
-
-    Rays go between random places in the box; each has 1024 estimates by each estimator. Raises InputError for a scene
-    without a grid.
+    `steps`: of the marches. Rays go between random places in the box; each has 1024 estimates by each estimator.
     """
     medium = reference.medium
-    if not isinstance(medium, GridMedium):
-        raise InputError("transmittance: the scene has no density grid around its camera; expected one, such as smoke")
+    assert isinstance(medium, GridMedium)
     random = np.random.default_rng(1)
     begin, end = medium.low + random.random((2, _RAYS, 3)) * (medium.high - medium.low)
     length = np.linalg.norm(end - begin, axis=1)
@@ -129,8 +118,6 @@ def transmittance_errors(
         found.setdefault((name, count), []).append((look_ups, float(values.mean()), float(values.var()), variance))
 
     for ray in range(_RAYS):
-        if progress is not None:
-            progress(ray / _RAYS, "rays")
 
         def look(fraction: Array, ray: int = ray) -> Array:
             places = begin[ray] + fraction[..., None] * (end - begin)[ray]

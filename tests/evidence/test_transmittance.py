@@ -9,7 +9,7 @@ import pytest
 from reference.scene.read import read_reference
 from tests.helpers.density_grid import ROUGH, grid_xml, volume
 from tests.helpers.height_fog import LAMP
-from validation.estimates.transmittance import (
+from tests.helpers.transmittance import (
     jackknife,
     marches,
     naive,
