@@ -25,13 +25,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import binom, nct
 
-from validation.statistics.comparison import Estimate, Statistics, compare_statistics
+from validation.statistics.comparison import LEVEL, Estimate, Statistics, compare_statistics
 from validation.statistics.samples import student_quantile, uniformity_p
 
 Array = NDArray[np.float64]
 Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers of mean 0 and standard deviation 1
 
-LEVEL = 0.01  #: of the tests of values, pixels and blocks
 BATCHES, SIZE = 16, (24, 24)  #: of images
 
 
@@ -151,7 +150,7 @@ def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Sta
     for _ in range(experiment.runs):
         test = estimate((1 + bias) * profile)
         reference = estimate(profile) if experiment.noisy_reference else Estimate(profile)
-        comparisons.append(compare_statistics(reference, test, family_level=LEVEL, plain_level=LEVEL))
+        comparisons.append(compare_statistics(reference, test))
     return comparisons
 
 

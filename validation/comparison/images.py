@@ -21,7 +21,7 @@ from validation.metrics.colour import ColourDifference, colour_difference
 from validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
 from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
-from validation.statistics.comparison import Estimate, compare_statistics
+from validation.statistics.comparison import LEVEL, Estimate, compare_statistics
 from validation.statistics.records import Statistics
 
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
@@ -190,9 +190,9 @@ def statistics_lines(s: Statistics) -> list[str]:
         f"{shown(s.zero_reference_error, 3)} of the mean",
         f"z                mean {_fixed(s.z_mean)}, standard deviation {_fixed(s.z_std)}, {s.tested} values; "
         f"{s.zero_variance} without variance differ by up to {shown(s.zero_variance_error, 3)} of the mean",
-        f"rejected         {s.rejected} pixels, {s.expected_rejections:.2g} expected (Sidak level {s.family_level:g}); "
+        f"rejected         {s.rejected} pixels, {s.expected_rejections:.2g} expected (Sidak level {LEVEL:g}); "
         f"{s.rejected_blocks} of {s.blocks} blocks",
-        f"exceeding        {s.exceeding} values, {s.expected_exceeding:.0f} expected (level {s.plain_level:g}), "
+        f"exceeding        {s.exceeding} values, {s.expected_exceeding:.0f} expected (level {LEVEL:g}), "
         f"p = {shown(s.exceeding_p, 3)}; p-values uniform: p = {shown(s.uniformity_p, 3)}",
     ]
 

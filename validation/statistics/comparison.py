@@ -11,7 +11,7 @@ For two random images the degrees of freedom are Welch and Satterthwaite's, s^4 
 the normal law holds if no K is given. P(|Z| >= |z|) is the p-value, uniform in [0, 1] if the images agree.
 
 **Rejected pixels.** The smallest of m independent p-values is below a with probability 1 - (1 - a)^m. Sidak's level
-a = 1 - (1 - A)^(1/m) makes that A (`family_level`): one false alarm in 1/A comparisons of images, however many pixels
+a = 1 - (1 - A)^(1/m) makes that A (`LEVEL`): one false alarm in 1/A comparisons of images, however many pixels
 they have. The expected number of rejections is m a, about A. That finds an outlier, but hardly a bias of all pixels.
 
 **Exceedances.** n independent p-values are below a plain level a Binomial(n, a) times. More mean a bias or standard
@@ -80,6 +80,9 @@ from validation.statistics.samples import (
 )
 
 BLOCK = 8  #: side of a block [pixels]
+#: The probability with which a comparison of images that agree rejects any pixel, and any block; values whose p-value
+#: is below it are counted.
+LEVEL = 0.01
 
 
 @dataclass(frozen=True)
@@ -112,8 +115,6 @@ def compare_statistics(
     *,
     mask: ArrayLike | None = None,
     margin: float | None = None,
-    family_level: float = 0.01,
-    plain_level: float = 0.01,
 ) -> Statistics:
     """Test two images against each other (derivations: see the module).
 
@@ -127,10 +128,10 @@ def compare_statistics(
     At least one of two independent estimates has a standard error. Pixels that the mask leaves out, (height, width) of
     truth values, or that are not finite in either mean are not compared: `error_metrics` counts the latter, and batch
     means, which would not be of these pixels, are then ignored. A relative bias up to the `margin` [1] counts as
-    agreement, such as 0.005. With the probability `family_level` a comparison of agreeing images rejects any pixel, and
-    likewise any block; values that exceed `plain_level` are counted.
+    agreement, such as 0.005.
     """
-    _check_levels(margin, family_level, plain_level)
+    if margin is not None and not 0 < margin < np.inf:
+        raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
     ref, tst, asked = compared(reference.mean, test.mean, mask)
     if reference.standard_error is None and test.standard_error is None:
         raise InputError("neither image has a standard error; give one, or compare them by their metrics alone")
@@ -145,20 +146,16 @@ def compare_statistics(
     intervals = [bias["relative_bias_ci"], bias["relative_bias_ci_batches"] or bias["relative_bias_ci"]]
     found = {
         "masked": (~asked).sum(),
-        **_value_tests(expected, tested, chosen, family_level, plain_level),
-        **_block_tests(expected, tested, family_level),
+        **_value_tests(expected, tested, chosen),
+        **_block_tests(expected, tested),
         **bias,
         "margin": margin,
         "equivalent": None if margin is None else all(-margin < low and high < margin for low, high in intervals),
-        "family_level": family_level,
-        "plain_level": plain_level,
     }
     return record_of(found, Statistics)
 
 
-def _value_tests(
-    expected: _Side, tested: _Side, chosen: Bools, family_level: float, plain_level: float
-) -> dict[str, Any]:
+def _value_tests(expected: _Side, tested: _Side, chosen: Bools) -> dict[str, Any]:
     """Test every value by itself."""
     difference, error = tested.mean - expected.mean, np.hypot(expected.error, tested.error)
     random = chosen[:, :, None] & (error > 0)
@@ -169,7 +166,7 @@ def _value_tests(
     channel = np.nonzero(random)[2]
     by_channel = [p[channel == c] for c in np.unique(channel)]
     small = np.zeros(random.shape, dtype=bool)
-    small[random] = p < sidak(family_level, z.size)
+    small[random] = p < sidak(LEVEL, z.size)
     dark = chosen[:, :, None] & (expected.mean == 0)
     mean = float(expected.mean[chosen].mean()) if chosen.any() else 0.0
     return {
@@ -181,10 +178,10 @@ def _value_tests(
         "z_mean": float(z.mean()) if z.size else float("nan"),
         "z_std": float(z.std(ddof=1)) if z.size > 1 else float("nan"),
         "rejected": int(small.any(axis=2).sum()),
-        "expected_rejections": z.size * sidak(family_level, z.size),
-        "exceeding": int((p < plain_level).sum()),
-        "expected_exceeding": z.size * plain_level,
-        "exceeding_p": bonferroni([binomial_p(int((q < plain_level).sum()), q.size, plain_level) for q in by_channel]),
+        "expected_rejections": z.size * sidak(LEVEL, z.size),
+        "exceeding": int((p < LEVEL).sum()),
+        "expected_exceeding": z.size * LEVEL,
+        "exceeding_p": bonferroni([binomial_p(int((q < LEVEL).sum()), q.size, LEVEL) for q in by_channel]),
         "uniformity_p": bonferroni([uniformity_p(q) for q in by_channel]),
     }
 
@@ -194,7 +191,7 @@ def _largest(difference: Array, mean: float) -> float:
     return float(np.abs(difference).max(initial=0.0)) / mean if mean > 0 else float("nan")
 
 
-def _block_tests(expected: _Side, tested: _Side, family_level: float) -> dict[str, Any]:
+def _block_tests(expected: _Side, tested: _Side) -> dict[str, Any]:
     """Test the sums over blocks of pixels."""
     difference = block_sums(np.where(np.hypot(expected.error, tested.error) > 0, tested.mean - expected.mean, 0.0))
     variance = block_sums(expected.error**2 + tested.error**2)
@@ -202,21 +199,13 @@ def _block_tests(expected: _Side, tested: _Side, family_level: float) -> dict[st
     random = variance > 0
     z = difference[random] / np.sqrt(variance[random])
     p = two_sided_p(z, satterthwaite(variance, spread)[random])
-    return {"blocks": z.size, "rejected_blocks": int((p < sidak(family_level, z.size)).sum())}
+    return {"blocks": z.size, "rejected_blocks": int((p < sidak(LEVEL, z.size)).sum())}
 
 
 def block_sums(values: Array, side: int = BLOCK) -> Array:
     """Return the sums over square blocks, smaller ones at the far edges: (rows, columns, channels)."""
     rows, columns = (np.arange(0, length, side) for length in values.shape[:2])
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
-
-
-def _check_levels(margin: float | None, family_level: float, plain_level: float) -> None:
-    for name, level in (("family_level", family_level), ("plain_level", plain_level)):
-        if not 0 < level < 1:
-            raise InputError(f"{name}: got {level}, expected a probability between 0 and 1, such as 0.01")
-    if margin is not None and not 0 < margin < np.inf:
-        raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
 
 
 def _side(name: str, estimate: Estimate, chosen: Bools, *, scale: float, with_batches: bool) -> _Side:

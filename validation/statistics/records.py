@@ -28,7 +28,7 @@ class Statistics:
     z_std: Number
     rejected: int  #: pixels with a value rejected at Sidak's level
     expected_rejections: float
-    exceeding: int  #: values below `plain_level`
+    exceeding: int  #: values whose p-value is below `validation.statistics.comparison.LEVEL`
     expected_exceeding: float
     exceeding_p: Number  #: p-value of `exceeding`, both tails
     blocks: int  #: of 8 x 8 pixels, one channel each
@@ -45,8 +45,6 @@ class Statistics:
     detectable_bias: Number  #: smallest that is found with 90 % power at the 5 % level, by the wider interval
     margin: Number
     equivalent: bool | None  #: whether all intervals lie within the margin
-    family_level: float
-    plain_level: float
 
 
 @dataclass(frozen=True, kw_only=True)

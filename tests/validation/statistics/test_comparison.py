@@ -31,19 +31,19 @@ def test_hand_computed_values():
     assert s.rejected_blocks == 0  # z = 0.2 / 0.2
 
 
-def test_students_law_and_welchs_degrees_of_freedom():
+def test_students_law_and_welchs_degrees_of_freedom(monkeypatch):
     # z = 3.2 with 3 degrees of freedom: p = 0.0493; normal: p = 0.0014. Equal variances of 4 batches each give 6.
     unit = Estimate(np.ones((1, 1)))
     z = 3.2
-    level = 0.01
     random = Estimate(np.full((1, 1), 1 + 0.1 * z), np.full((1, 1), 0.1), 4)
     exact = dataclasses.replace(random, batches=None)
-    assert compare_statistics(unit, random, plain_level=level).exceeding == 0
-    assert compare_statistics(unit, exact, plain_level=level).exceeding == 1
+    assert compare_statistics(unit, random).exceeding == 0
+    assert compare_statistics(unit, exact).exceeding == 1
     both = Estimate(np.ones((1, 1)), np.full((1, 1), 0.1), 4)
     p = 2 * stats.t.sf(0.1 * z / np.hypot(0.1, 0.1), 6)
     for factor, exceeding in ((0.999, 0), (1.001, 1)):
-        assert compare_statistics(both, random, plain_level=factor * p).exceeding == exceeding
+        monkeypatch.setattr("validation.statistics.comparison.LEVEL", factor * p)
+        assert compare_statistics(both, random).exceeding == exceeding
 
 
 def test_sidak_level_counts_all_values():
