@@ -71,33 +71,33 @@ def read_cases(path: str | Path) -> Cases:
     return _checked(_Table(str(path), columns, tuple(number for number, _ in lines)))
 
 
-def cases_from_columns(columns: Mapping[str, Any], *, name: str = "cases") -> tuple[Cases, tuple[int, ...]]:
+def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ...]]:
     """Return cases from columns in memory, and the shape that their values have together.
 
     `columns`: by name the columns of this module, of any shapes that broadcast together. `foot` and `height` may
-    stand for `t` and `h`, and `origin`, `direction` and `light`, (..., 3), for the coordinates of rays. `name`: what
-    messages call them; they count rows from 0. Raises InputError as `read_cases`, and for columns whose shapes do not
-    go together.
+    stand for `t` and `h`, and `origin`, `direction` and `light`, (..., 3), for the coordinates of rays. Raises
+    InputError as `read_cases`, and for columns whose shapes do not go together; messages count rows from 0.
     """
     given: dict[str, Any] = {}
     for key, values in columns.items():
-        if key in _VECTORS:
-            given |= _coordinates(key, values, name)
+        column = np.asarray(values)
+        if key not in _VECTORS:
+            given[_NAMES.get(key, key)] = column
+        elif column.ndim == 0 or column.shape[-1] != 3:
+            raise InputError(f"cases, column '{key}': got an array of shape {column.shape}, expected (..., 3)")
         else:
-            given[_NAMES.get(key, key)] = np.asarray(values)
+            given |= {letter: column[..., number] for number, letter in enumerate(_VECTORS[key])}
     known = {key: values for key, values in given.items() if key in _KNOWN}
     try:
         spread = np.broadcast_arrays(*known.values())
     except ValueError:
         shapes = ", ".join(f"{key} {values.shape}" for key, values in known.items())
-        raise InputError(
-            f"{name}: the columns have shapes that do not go together: {shapes}; give equal ones"
-        ) from None
+        raise InputError(f"cases: the columns have shapes that do not go together: {shapes}; give equal ones") from None
     shape = spread[0].shape if spread else ()
     flat = {key: values.reshape(-1) for key, values in zip(known, spread)}
     if not all(len(values) for values in flat.values()):
-        raise InputError(f"{name}: the columns are empty; give at least one case")
-    return _checked(_Table(name, flat)), shape
+        raise InputError("cases: the columns are empty; give at least one case")
+    return _checked(_Table("cases", flat)), shape
 
 
 def _checked(table: "_Table") -> Cases:
@@ -236,10 +236,3 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _coordinates(key: str, values: Any, name: str) -> dict[str, Array]:
-    vectors = np.asarray(values)
-    if vectors.ndim == 0 or vectors.shape[-1] != 3:
-        raise InputError(f"{name}, column '{key}': got an array of shape {vectors.shape}, expected (..., 3)")
-    return {letter: vectors[..., number] for number, letter in enumerate(_VECTORS[key])}

@@ -12,7 +12,7 @@ and the differences of two pixels follow from the last line of each. The clippin
 fitted to surface colours and is not defined above white, nor PQ below 0. It is not silent: pixels that it changed in
 either image are counted. A difference of 1 is about what a keen eye just sees, in both formulae.
 
-The exposure is in stops. By default it brings the 99th percentile of the reference to 0.9, as the pictures of a report
+The exposure is in stops. It brings the 99th percentile of the reference to 0.9, as the pictures of a report
 do; it depends on the reference alone, so that all tests against one reference are judged at one exposure.
 
 CIEDE2000: CIE 142-2001; Sharma, Wu and Dalal 2005 for its branches. Delta E ITP: ITU-R BT.2124-0, annex 1; PQ and
@@ -25,7 +25,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analytic.errors import InputError
 from validation.arrays import Array
 from validation.columns import column
 from validation.metrics.errors import colours, compared
@@ -54,28 +53,23 @@ class ColourDifference:
     itp_max: float | None = column("Delta E ITP, largest", "1", "largest Delta E ITP")
 
 
-def colour_difference(
-    reference: ArrayLike, test: ArrayLike, *, exposure: float | None = None, mask: ArrayLike | None = None
-) -> ColourDifference:
+def colour_difference(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None) -> ColourDifference:
     """Return how different two images look (see the module).
 
-    Radiances [W/(m^2 sr)] are (height, width), (height, width, 1) for grey or (height, width, 3). The exposure is in
-    stops, that of `auto_exposure` by default; the mask, (height, width) of truth values, says which pixels to compare.
+    Radiances [W/(m^2 sr)] are (height, width), (height, width, 1) for grey or (height, width, 3). The mask, (height,
+    width) of truth values, says which pixels to compare.
     """
-    if exposure is not None and not np.isfinite(exposure):
-        raise InputError(f"exposure: got {exposure}, expected a number of stops such as -2, or none to choose it")
     ref, tst, chosen = compared(reference, test, mask)
     ref, tst = colours(ref), colours(tst)
     finite = chosen & (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
-    if exposure is None:
-        exposure = auto_exposure(ref[finite])
+    exposure = auto_exposure(ref[finite])
     shown = np.stack([ref[finite], tst[finite]]) * 2.0**exposure
     brightest = PEAK_LUMINANCE / WHITE_LUMINANCE
     surface, light = np.clip(shown, 0, 1), np.clip(shown, 0, brightest)
     de = ciede2000(*_lab(surface))
     itp = delta_e_itp(*_ictcp(light * WHITE_LUMINANCE))
     return ColourDifference(
-        exposure=float(exposure),
+        exposure=exposure,
         white_luminance=WHITE_LUMINANCE,
         peak_luminance=PEAK_LUMINANCE,
         pixels=int(chosen.sum()),
