@@ -15,7 +15,7 @@ from zero by chance.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,14 +37,11 @@ class Claim:
     undecided: int  #: of these, with an error nearer to the target than the reference is exact
     refused: int  #: scenes beside these
     untold: int  #: further scenes that have no reference
+    fraction: float | None  #: of the scenes that are within the error for sure; None without scenes
     low: float
     high: float
     level: float = LEVEL
-
-    @property
-    def fraction(self) -> float | None:
-        """Fraction of the scenes that are within the error for sure; None without scenes."""
-        return self.within / self.tries if self.tries else None
+    text: str = ""  #: the claim as a sentence
 
     @property
     def fraction_words(self) -> str:
@@ -56,12 +53,6 @@ class Claim:
         words += f"; {self.refused} more refused" if self.refused else ""
         return words + (f"; no reference of {self.untold} more" if self.untold else "")
 
-    @property
-    def text(self) -> str:
-        """The claim as a sentence."""
-        within = f"within {written(self.target)} {self.fraction_words}" if self.tries else "no scene was tried"
-        return f"{self.label}: {within}."
-
 
 def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     """Return in what fraction of the scenes a relative RMSE is at most the target; `level` is of this claim [1]."""
@@ -71,7 +62,7 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     possibly = finite & (sample.errors - sample.reference_errors <= target)
     tries = int(measured.sum()) + sample.count(*FAULTS)
     within, at_most = int(surely.sum()), int(possibly.sum())
-    return Claim(
+    made = Claim(
         label=sample.label,
         target=target,
         tries=tries,
@@ -79,10 +70,13 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
         undecided=at_most - within,
         refused=sample.count("refused"),
         untold=sample.count(UNTOLD),
+        fraction=within / tries if tries else None,
         low=binomial_interval(within, tries, level)[0],
         high=binomial_interval(at_most, tries, level)[1],
         level=level,
     )
+    words = f"within {written(target)} {made.fraction_words}" if tries else "no scene was tried"
+    return replace(made, text=f"{sample.label}: {words}.")
 
 
 def claims(made: Sequence[Sample], targets: Sequence[float] = TARGETS) -> list[Claim]:

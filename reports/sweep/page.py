@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from reference.storage.files import ensure_folder, write_bytes, write_text
 from reports import __version__
 from reports.page.chart import svg_text
@@ -22,7 +20,8 @@ from reports.sweep import tables
 from reports.sweep.claims import LEAST, NAMED, SAME, TARGETS, property_words
 from reports.sweep.figures import drawn as drawn_figures
 from reports.sweep.samples import read_sweep
-from reports.sweep.summary import Summary, headlines, sound_words, summary_of, to_json
+from reports.sweep.summary import Summary, sound_words, summary_of
+from validation.columns import plain
 
 PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep
 PICTURES = 400  #: most on a page, of some 20 kB each
@@ -43,7 +42,7 @@ def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path
         charts[name] = svg_text(figure, name)
         write_text(folder / FIGURES / f"{name}.svg", charts[name])
         write_bytes(folder / FIGURES / f"{name}.pdf", file_bytes(figure, ".pdf", dpi=320))
-    write_text(folder / CLAIMS, json.dumps(to_json(said), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(folder / CLAIMS, json.dumps(plain(said), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     write_text(folder / PAGE, render_sweep(said, charts))
     return said, folder / PAGE
 
@@ -63,12 +62,11 @@ def render_sweep(said: Summary, charts: Mapping[str, str]) -> str:
         "omitted": max(0, len(worst) - PICTURES),
         "said": said,
         "scenes": f"{said.scenes} {'random ' * said.drawn}scene{'s' * (said.scenes != 1)}",
-        "headlines": headlines(said),
         "charts": {name: Markup(chart) for name, chart in charts.items()},
         "sound": sound_words(said),
         "source": said.sweep.path.name,
         "folder": said.sweep.path.parent,
-        "timed": sum(int(np.isfinite(sample.times).sum()) for sample in said.samples),
+        "timed": sum(sample.timed for sample in said.samples),
         "undecided": sum(each.undecided for each in said.claims),
         "decided": len(TARGETS) * sum(sample.count("done") for sample in said.samples),
         "same": SAME,

@@ -21,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from validation.columns import plain
+from validation.statistics.samples import quantile_interval
 from validation.study.row import COLUMNS, FRAME_MS, NO_REFERENCE, PROPERTY, STATUSES
 
 FILE = "sweep.parquet"  #: in the folder of a sweep
@@ -179,18 +181,33 @@ UNTOLD = "no reference"  #: of a scene whose reference was not done, so that no 
 
 
 @dataclass(frozen=True)
+class Quantile:
+    """A quantile of the errors of a configuration, with its interval; None for infinite ones."""
+
+    probability: float
+    value: float | None
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
 class Sample:
-    """One configuration over the scenes, one entry a scene."""
+    """One configuration over the scenes; what has one entry a scene is not written."""
 
     label: str  #: as tables name it in full
     method: str
-    scenes: tuple[str, ...]
-    rows: tuple[int, ...]  #: of the sweep: where each scene's cell with the largest error stands
-    statuses: tuple[str, ...]  #: what became of each scene: that of its row, or `UNTOLD`
-    errors: Numbers  #: relative RMSE [1]: infinite where the image has no finite pixel, NaN where nothing was measured
-    reference_errors: Numbers  #: the reference's own, over its mean [1]; 0 where it says nothing
-    nonfinite: Numbers  #: pixels with NaN or infinity, in all cells of a scene
-    times: Numbers  #: of a frame [ms], see `comparable_times`; NaN elsewhere
+    counts: Mapping[str, int]  #: scenes that ended so
+    relative_rmse: tuple[Quantile, ...]  #: its median and its 95 % quantile; none if nothing was measured
+    frame_ms: float | None  #: median of the scenes whose time is known [ms]
+    timed: int  #: scenes whose time is known
+    scenes: tuple[str, ...] = field(repr=False)
+    rows: tuple[int, ...] = field(repr=False)  #: of the sweep: where each scene's cell with the largest error stands
+    statuses: tuple[str, ...] = field(repr=False)  #: what became of each scene: that of its row, or `UNTOLD`
+    #: Relative RMSE [1]: infinite where the image has no finite pixel, NaN where nothing was measured.
+    errors: Numbers = field(repr=False)
+    reference_errors: Numbers = field(repr=False)  #: the reference's own, over its mean [1]; 0 where it says nothing
+    nonfinite: Numbers = field(repr=False)  #: pixels with NaN or infinity, in all cells of a scene
+    times: Numbers = field(repr=False)  #: of a frame [ms], see `comparable_times`; NaN elsewhere
 
     @property
     def measured(self) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
@@ -199,7 +216,7 @@ class Sample:
 
     def count(self, *statuses: str) -> int:
         """Return how many scenes ended so."""
-        return sum(status in statuses for status in self.statuses)
+        return sum(self.counts.get(status, 0) for status in statuses)
 
 
 def drawn_at_random(sweep: Sweep) -> bool:
@@ -228,10 +245,15 @@ def samples(sweep: Sweep) -> list[Sample]:
     for (_, method, _), whole, group in zip(groups, full, groups.values()):
         worst = tuple(max(rows, key=badness.__getitem__) for rows in group.values())
         places = list(worst)
+        known = times[places][np.isfinite(times[places])]
         made.append(
             Sample(
                 label=whole,
                 method=method,
+                counts=dict(Counter(statuses[places].tolist())),
+                relative_rmse=_quantiles(errors[places]),
+                frame_ms=float(np.median(known)) if len(known) else None,
+                timed=len(known),
                 scenes=tuple(group),
                 rows=worst,
                 statuses=tuple(statuses[places]),
@@ -242,6 +264,12 @@ def samples(sweep: Sweep) -> list[Sample]:
             )
         )
     return made
+
+
+def _quantiles(errors: Numbers) -> tuple[Quantile, ...]:
+    known = errors[~np.isnan(errors)]
+    ends = ((each, quantile_interval(known, each)) for each in (0.5, 0.95) if len(known))
+    return tuple(Quantile(each, *map(plain, found)) for each, found in ends)
 
 
 def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
@@ -291,25 +319,25 @@ class Fastest:
     """In how many scenes each configuration is the fastest within an error."""
 
     target: float
-    counts: tuple[int, ...]  #: by configuration
+    counts: Mapping[str, int]  #: by label of a configuration
     none: int  #: scenes in which no configuration is within the error
     scenes: int  #: in which whatever was measured was timed with the machine to itself
 
 
 def fastest_within(made: Sequence[Sample], target: float) -> Fastest:
     """Return in how many scenes each configuration is the fastest within an error."""
-    best: dict[str, tuple[float, int]] = {}
+    best: dict[str, tuple[float, str]] = {}
     timed: dict[str, bool] = {}
-    for place, sample in enumerate(made):
+    for sample in made:
         rows = zip(sample.scenes, sample.statuses, sample.errors, sample.nonfinite, sample.times)
         for scene, status, error, bad, time in rows:
             if status != "done":
                 continue
             timed[scene] = timed.get(scene, True) and bool(np.isfinite(time))
-            if error <= target and not bad and time < best.get(scene, (np.inf, 0))[0]:
-                best[scene] = (float(time), place)
+            if error <= target and not bad and time < best.get(scene, (np.inf, ""))[0]:
+                best[scene] = (float(time), sample.label)
     scenes = {scene for scene, fully in timed.items() if fully}
-    counts = [0] * len(made)
-    for scene, (_, place) in best.items():
-        counts[place] += scene in scenes
-    return Fastest(target, tuple(counts), len(scenes) - sum(counts), len(scenes))
+    counts = {sample.label: 0 for sample in made}
+    for scene, (_, label) in best.items():
+        counts[label] += scene in scenes
+    return Fastest(target, counts, len(scenes) - sum(counts.values()), len(scenes))

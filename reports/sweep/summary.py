@@ -2,9 +2,8 @@
 """All that a sweep says, worked out once: for the page, the tables and `--json`."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,9 +21,8 @@ from reports.sweep.claims import (
     written,
 )
 from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
-from reports.sweep.samples import FAULTS, Fastest, Numbers, Sample, Sweep, drawn_at_random, fastest_within, samples
-from validation.columns import plain
-from validation.statistics.samples import LEVEL, binomial_interval, quantile_interval
+from reports.sweep.samples import FAULTS, Fastest, Sample, Sweep, drawn_at_random, fastest_within, samples
+from validation.statistics.samples import LEVEL, binomial_interval
 
 SCHEMA = "airlight-sweep/1"
 
@@ -37,6 +35,7 @@ class Summary:
     """The results of a sweep."""
 
     sweep: Sweep
+    rows: int
     drawn: bool  #: whether claims are about scenes that were drawn at random
     samples: tuple[Sample, ...]
     claims: tuple[Claim, ...]
@@ -54,6 +53,8 @@ class Summary:
     named_scenes: int  #: others
     studies: tuple[str, ...]
     started: tuple[str, str] | None  #: when the first and the last cell began
+    headlines: tuple[Headline, ...] = ()  #: what a reader should know first
+    schema: str = SCHEMA
 
 
 def summary_of(sweep: Sweep) -> Summary:
@@ -66,8 +67,9 @@ def summary_of(sweep: Sweep) -> Summary:
     drawn = drawn_at_random(sweep)
     own = sweep.numbers("reference.error")
     own = own[np.isfinite(own)]
-    return Summary(
+    said = Summary(
         sweep=sweep,
+        rows=len(sweep),
         drawn=drawn,
         samples=made,
         claims=tuple(claims(made)),
@@ -89,17 +91,10 @@ def summary_of(sweep: Sweep) -> Summary:
         studies=tuple(sorted(set(sweep.texts("study")) - {None})),
         started=_span(sweep),
     )
+    return replace(said, headlines=tuple(_headlines(said)))
 
 
-def finite_median(values: Numbers) -> float | None:
-    """Return the median of the values that are not NaN, None where none is or it is infinite."""
-    known = values[~np.isnan(values)]
-    median = float(np.median(known)) if len(known) else np.inf
-    return median if np.isfinite(median) else None
-
-
-def headlines(said: Summary) -> list[Headline]:
-    """Return what a reader should know first."""
+def _headlines(said: Summary) -> list[Headline]:
     made: list[Headline] = []
 
     def add(kind: str, text: str, good: bool | None = None) -> None:
@@ -111,13 +106,13 @@ def headlines(said: Summary) -> list[Headline]:
             others = f" and {len(best) - 1} more" if best[1:] else ""
             add(f"Most often within {written(target)}", f"{best[0].label}{others}, {best[0].fraction_words}.")
     for each in said.fastest:
-        if each.scenes and sum(each.counts):
-            place = int(np.argmax(each.counts))
+        if any(each.counts.values()):
+            label = max(each.counts, key=each.counts.__getitem__)
             none = f"; in {each.none} none is within it" if each.none else ""
-            fraction = percent(each.counts[place] / each.scenes, each.scenes)
+            fraction = percent(each.counts[label] / each.scenes, each.scenes)
             add(
                 f"Fastest within {written(each.target)}",
-                f"{said.samples[place].label}, in {fraction} % of {each.scenes} scenes{none}.",
+                f"{label}, in {fraction} % of {each.scenes} scenes{none}.",
             )
     leading = Counter(chosen[0].property for chosen in said.strongest.values() if chosen)
     if leading:
@@ -162,58 +157,6 @@ def sound_words(said: Summary) -> str:
         f"no image of {checked['not finite'].rows} has a pixel that is not finite or negative{bound}; of scenes alike "
         f"at most {most:.2g} % may have one, at {100 * LEVEL:.0f} % confidence."
     )
-
-
-def to_json(said: Summary) -> dict[str, Any]:
-    """Return everything as plain data, for `--json`; nothing in it is infinite or NaN."""
-    names = {sample.label: sample for sample in said.samples}
-    counts = ("studies", "statuses", "scenes", "named_scenes", "reference_errors")
-    lists = ("correlations", "checks", "faults")
-    return {
-        "schema": SCHEMA,
-        "source": str(said.sweep.path),
-        "rows": len(said.sweep),
-        "superseded": said.sweep.superseded,
-        "drawn_at_random": said.drawn,
-        "level": LEVEL,
-        **{name: plain(getattr(said, name)) for name in (*counts, "versions", "started", "worst", *lists)},
-        "headlines": plain(headlines(said)),
-        "claims": [plain(each) | {"fraction": each.fraction, "text": each.text} for each in said.claims],
-        "configurations": [_configuration(sample) for sample in said.samples],
-        "fastest": [plain(each) | {"counts": dict(zip(names, each.counts))} for each in said.fastest],
-        "goes_with": {label: [each.property for each in said.strongest[label]] for label in names},
-        "refusals": [plain(each) for each in said.reasons if each.status == "refused"],
-        "not_done": [plain(each) for each in said.reasons if each.status != "refused"],
-    }
-
-
-@dataclass(frozen=True)
-class Quantile:
-    """A quantile of the errors of a configuration, with its interval; None for infinite ones."""
-
-    probability: float
-    value: float | None
-    low: float | None
-    high: float | None
-
-
-def quantiles(errors: Numbers, probabilities: Sequence[float] = (0.5, 0.95)) -> list[Quantile]:
-    """Return quantiles of the errors of a configuration; none if nothing was measured."""
-    known = errors[~np.isnan(errors)]
-    ends = ((each, quantile_interval(known, each)) for each in probabilities if len(known))
-    return [Quantile(each, *(plain(end) for end in found)) for each, found in ends]
-
-
-def _configuration(sample: Sample) -> dict[str, Any]:
-    return {
-        "label": sample.label,
-        "method": sample.method,
-        "scenes": len(sample.scenes),
-        "statuses": dict(Counter(sample.statuses)),
-        "relative_rmse": plain(quantiles(sample.errors)),
-        "frame_ms": finite_median(sample.times),
-        "timed_alone": int(np.isfinite(sample.times).sum()),
-    }
 
 
 def _span(sweep: Sweep) -> tuple[str, str] | None:

@@ -6,7 +6,7 @@ import numpy as np
 from reports.sweep.claims import TARGETS, property_words, written
 from reports.sweep.faults import Check, Fault
 from reports.sweep.samples import FAULTS, UNTOLD
-from reports.sweep.summary import Summary, quantiles
+from reports.sweep.summary import Summary
 from reports.tables.table import Column, Measured, Name, Table, numbers, table, table_of, words
 
 _FRACTION = {"digits": 2, "fraction": True}
@@ -26,7 +26,7 @@ def errors_table(said: Summary) -> Table:
     )
     rows = []
     for sample in said.samples:
-        values = quantiles(sample.errors)
+        values = sample.relative_rmse
         row = {
             "label": sample.label,
             "scenes": len(sample.scenes),
@@ -66,13 +66,13 @@ def speed_table(said: Summary) -> Table:
         ),
     )
     rows = []
-    for place, sample in enumerate(said.samples):
+    for sample in said.samples:
         known = sample.times[np.isfinite(sample.times)]
         row = {"label": sample.label, "timed": len(known)}
         if len(known):
             first, middle, third = np.quantile(known, (0.25, 0.5, 0.75)).tolist()
             row["frame"] = Measured(middle, first, third)
-        row |= {f"fastest_{e.target:g}": e.counts[place] / e.scenes if e.scenes else None for e in said.fastest}
+        row |= {f"fastest_{e.target:g}": e.counts[sample.label] / e.scenes if e.scenes else None for e in said.fastest}
         rows.append(row)
     none = ", ".join(f"{each.none} within {written(each.target)}" for each in said.fastest)
     explanation = (

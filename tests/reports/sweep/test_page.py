@@ -12,9 +12,10 @@ from reports.page.chart import svg_text
 from reports.sweep.figures import drawn
 from reports.sweep.page import render_sweep, write_sweep
 from reports.sweep.samples import FILE, read_sweep
-from reports.sweep.summary import summary_of, to_json
+from reports.sweep.summary import summary_of
 from tests.helpers.page import Page
 from tests.helpers.sweeps import METHODS, faulty_rows, row, rows, write_rows
+from validation.columns import plain
 
 
 def said_of(folder, several):
@@ -70,7 +71,7 @@ def test_sweeps_at_the_edges_have_their_page(tmp_path, several):
     assert "None" not in text
     assert "nan" not in re.findall(r"\b\w+\b", text)
     assert "inf" not in re.findall(r"\b\w+\b", text)
-    assert json.loads(json.dumps(to_json(said), allow_nan=False))["rows"] == said.scenes == len(several)
+    assert json.loads(json.dumps(plain(said), allow_nan=False))["rows"] == said.scenes == len(several)
 
 
 def test_names_and_reasons_are_words_and_never_html(tmp_path):
