@@ -80,14 +80,11 @@ _SHAFTS = {
 
 def _shafts(quick: bool, progress: Progress) -> PaperFigure:
     """Return Fig. 5.8 of Ali 2016 in `fence`: R1 to R4, the shared points, the reference, with errors and times."""
-    from realtime.scene.read_scene import read_scene
-    from validation.papers.soft_shafts import RENDERINGS, SCENE, VARIANTS, rendered, shafts_reference, timings
-    from validation.scenes.loading import load_scene
+    from validation.papers.soft_shafts import RENDERINGS, VARIANTS, rendered, shafts_scene, timings
 
     size = (80, 60) if quick else (200, 152)
     progress(0.0, "the reference")
-    reference = shafts_reference(size)
-    scene = read_scene(load_scene(SCENE, size).scene)
+    scene, reference = shafts_scene(size)
     chosen = {name: {**RENDERINGS, **VARIANTS}[name] for name in _SHAFTS}
     times = timings(scene, chosen, 0.05 if quick else 0.6)
     factor, shown, rows = exposure(reference.image), [], []

@@ -16,7 +16,7 @@ from realtime.scene.read_scene import read_scene
 from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics, known
-from validation.scenes.loading import load_scene
+from validation.scenes.loading import load_scene, resize
 from validation.study.configuration import configuration, prepared
 from validation.study.frame_times import moved_light
 
@@ -44,14 +44,15 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
     errors = []
     for name, (scene_name, full, cone) in ENTRIES.items():
         size, compared = _scaled(full, scale), _scaled(_COMPARED, scale)
-        scene = read_scene(load_scene(scene_name, size).scene)
-        small = load_scene(scene_name, compared).scene
-        reference = reference_image(small)
+        loaded = load_scene(scene_name, size).scene
+        scene = read_scene(loaded)
+        resize(loaded, compared)
+        reference = reference_image(loaded)
         whole = reference.airlight + reference.surface
         values = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "cone": cone}
         values["white"] = float(np.quantile(whole.max(axis=-1), 0.999))
         chosen = configuration("shadow-planes", "taylor", values)
-        frame = render_frame(prepared(read_scene(small), chosen))
+        frame = render_frame(prepared(read_scene(loaded), chosen))
         errors.append(known(error_metrics(whole, frame.airlight + frame.surface).p50))
         forms = chosen, configuration("shadow-planes", "exact")
         works = [moved_light(prepared(scene, form)) for form in forms]

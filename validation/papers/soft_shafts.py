@@ -92,8 +92,7 @@ class Reference:
 
 def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[str, Any]:
     """Return errors, ratios of errors, edges, flicker and rates by the names of the renderings."""
-    scene = read_scene(load_scene(SCENE, size).scene)
-    reference = shafts_reference(size)
+    scene, reference = shafts_scene(size)
     times = timings(scene, RENDERINGS, seconds)
     taps = {f"{count} taps": {"steps": count} for count in TAPS}
     chosen = {**RENDERINGS, **_at_equal_time(times), **VARIANTS, **taps}
@@ -114,12 +113,12 @@ def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[s
     }
 
 
-def shafts_reference(size: tuple[int, int]) -> Reference:
-    """Return the quadrature of the scene and its penumbra."""
+def shafts_scene(size: tuple[int, int]) -> tuple[Scene, Reference]:
+    """Return the scene, with its quadrature and its penumbra."""
     loaded = load_scene(SCENE, size).scene
-    reference = reference_image(loaded)
+    scene, reference = read_scene(loaded), reference_image(loaded)
     image = np.asarray(reference.airlight + reference.surface, dtype=np.float64)
-    return Reference(image, penumbra(read_scene(loaded)))
+    return scene, Reference(image, penumbra(scene))
 
 
 def penumbra(scene: Scene) -> Bools:
