@@ -74,7 +74,7 @@ def flat(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return dataclasses, containers and numbers as JSON holds them: no NumPy types, None for what is not finite.
+    """Return records, containers, arrays and numbers as JSON holds them: no NumPy types, None for what is not finite.
 
     A field that `repr` does not show, such as an image, is left out.
     """
@@ -86,8 +86,8 @@ def plain(value: Any) -> Any:
         return [plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
-    if isinstance(value, np.generic):
-        value = value.item()
+    if isinstance(value, np.generic | np.ndarray):
+        return plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -133,7 +133,7 @@ def scene_comparison(compared: EngineComparison, files: Sequence[tuple[str, str]
 
 def diagnosed(diagnoses: Sequence[Diagnosis]) -> Said:
     """Return what is wrong with an image: with each of airlight and surfaces where it has both as layers."""
-    several = [plain(each) | {"explained": each.explained} for each in diagnoses]
+    several = plain(diagnoses)
     first, *others = (diagnosis.lines for diagnosis in diagnoses)
     return Said(
         name="diagnosis",

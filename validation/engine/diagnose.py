@@ -78,13 +78,9 @@ class Diagnosis:
     residual: float  #: mean relative error of the image as it is
     left: float  #: what the first explanation leaves of it
     rest: str  #: what that is: noise, little, or less than a tenth of what it was; empty where it is none of these
+    explained: bool  #: whether that is nothing to explain
     place: str  #: where the remaining error lies; empty where it is noise, or little
     failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
-
-    @property
-    def explained(self) -> bool:
-        """Whether what is left is nothing to explain."""
-        return bool(self.rest)
 
     @property
     def lines(self) -> list[str]:
@@ -178,6 +174,7 @@ def diagnose_image(
         attempt.right.error,
         chosen.error,
         rest,
+        bool(rest),
         "" if rest else place_words(attempt.predictor, chosen),
         wrong,
     )

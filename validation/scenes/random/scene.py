@@ -10,13 +10,14 @@ All is drawn in radii of a stage about the origin, then scaled and moved to an a
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from validation.arrays import Array
+from validation.columns import plain
 from validation.properties.view import LightPlace, distance, lit_points
 from validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
 from validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
@@ -67,15 +68,8 @@ def random_record(name: str) -> SceneRecord:
 
 def drawn_values(name: str) -> dict[str, Any]:
     """Return the drawn values of a random scene, as plain data without meshes; lengths are in metres."""
-    return _plain(asdict(_lit(*_parse(name))[0]))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items() if key != "mesh"}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    drawn: dict[str, Any] = plain(_lit(*_parse(name))[0])
+    return drawn
 
 
 def _parse(name: str) -> tuple[int, Ranges]:
