@@ -40,9 +40,9 @@ from reference.quadrature.replicates import (
     Keep,
     Kept,
     PointPlan,
+    RayPoints,
     Sums,
     replicate_means,
-    square_points,
 )
 from reference.quadrature.stretches import Terms, cosine_profile, sums_of
 from reference.quadrature.surface import Reflection, SurfaceHits
@@ -121,7 +121,7 @@ def area_airlight(
         checked, disagreements, refined, left = (int(value) for value in got["checks"][:4])
         checks.append(RandomChecks(checked, disagreements, refined, left, float(got["checks"][4])))
 
-    def work(number: int, active: Index, points: Callable[[str], Array]) -> Kept:
+    def work(number: int, active: Index, points: Callable[[str], RayPoints]) -> Kept:
         return _scattered(beams[number], active, points(beams[number].light.kind), shadow_scale)
 
     sums = _by_replicate("airlight", len(beams), plan, work, tell=tell, keep=keep, add=add)
@@ -133,7 +133,7 @@ def _by_replicate(
     layer: str,
     lights: int,
     plan: PointPlan,
-    work: Callable[[int, Index, Callable[[str], Array]], Kept],
+    work: Callable[[int, Index, Callable[[str], RayPoints]], Kept],
     *,
     tell: Fraction,
     keep: Keep,
@@ -147,7 +147,8 @@ def _by_replicate(
         total = np.zeros((len(active), 3, REPLICATES))
         for number, first in itertools.product(range(lights), range(0, len(active), _RAYS)):
             rows = slice(first, first + _RAYS)
-            one = partial(work, number, active[rows], partial(_points, chosen, number))
+            points = partial(RayPoints.of, chosen, number, len(active[rows]), part=first)
+            one = partial(work, number, active[rows], points)
             got = keep(f"{layer}-{part}{number}-{chosen.most}-{first}", one)
             total[rows] += _controlled(got["radiance"], got["fraction"]) if "fraction" in got else got["radiance"]
             if part != PILOT:
@@ -157,11 +158,6 @@ def _by_replicate(
         return total
 
     return sums
-
-
-def _points(plan: PointPlan, number: int, kind: str) -> Array:
-    """Return the points of the unit square of all replicates of a light, one replicate after the other."""
-    return np.concatenate([square_points(plan, number, replicate, kind) for replicate in range(REPLICATES)])
 
 
 def _controlled(found: Array, fractions: Array) -> Array:
@@ -183,9 +179,9 @@ def turn_of_sections(plan: PointPlan, number: int) -> float:
     return 0.25 * np.pi * (0.5 + np.random.default_rng((plan.seed, number)).random())
 
 
-def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) -> Kept:
+def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float) -> Kept:
     """Return sums over samples: radiances, (rays, 3, replicates), bounds of their errors, and counts of the checks."""
-    reference, light, count, each = beam.scene, beam.light, len(active), len(square)
+    reference, light, count, each = beam.scene, beam.light, len(active), len(points)
     radiance, bound, checks = np.zeros((count, 3, REPLICATES)), np.zeros((count, 3)), [RandomChecks()]
     step = max(1, _PAIRS // each)
 
@@ -193,7 +189,7 @@ def _scattered(beam: Beam, active: Index, square: Array, shadow_scale: float) ->
         for first in range(0, count, step):
             rows = slice(first, first + step)
             direction, distance = reference.direction[active[rows]], beam.distance[active[rows]]
-            samples = samples_for_rays(light, reference.origin, direction, distance, square)
+            samples = samples_for_rays(light, reference.origin, direction, distance, points[rows])
             place, normal, weight = samples.flat()
             rays = rays_at(reference.origin, np.repeat(direction, each, axis=0), place)
             low, high = before(rays, normal)
@@ -252,7 +248,7 @@ def area_surface(
     turns = [turn_of_sections(plan, number) for number in range(len(beams))]
     hidden = [_partly_hidden(beam, rows, turn) for beam, turn in zip(beams, turns, strict=True)]
 
-    def work(number: int, active: Index, points: Callable[[str], Array]) -> Kept:
+    def work(number: int, active: Index, points: Callable[[str], RayPoints]) -> Kept:
         radiance, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
         beam = beams[number]
         for pairs, kind in ((False, beam.light.kind), (True, "pairs")):
@@ -272,7 +268,7 @@ class _View:
     """How surface points look at a light: at which sections."""
 
     beam: Beam
-    square: Array  # points of the unit square, (sections, 2)
+    points: RayPoints  # of the unit square, by surface point
     turn: float  # [rad]
     even: bool  # see `sections_for_points`
 
@@ -280,7 +276,7 @@ class _View:
         """Yield which of the surface points of some rays see the light, these points, what `seen_samples` says of their
         sections in the order of points and of the square, and the mean of the weights of all sections of a point.
         """
-        reference, light, each = self.beam.scene, self.beam.light, len(self.square)
+        reference, light, each = self.beam.scene, self.beam.light, len(self.points)
         end = self.beam.distance[active]
         point = reference.origin + end[:, None] * reference.direction[active]
         away = point - light.centre
@@ -298,11 +294,12 @@ class _View:
         step = max(1, _PAIRS // each)
         for first in range(0, len(seeing), step):
             rows = seeing[first : first + step]
-            sections = sections_for_points(light, point[rows], self.square, self.turn, self.even)
+            square = self.points[rows]
+            sections = sections_for_points(light, point[rows], square, self.turn, self.even)
             # Looked at from a little before the surface, where the camera sees it: what hides there is not its own.
             eye = reference.origin + (end - _BEFORE * (1 + end))[rows, None] * reference.direction[active[rows]]
-            eye, uniform = np.repeat(eye, each, axis=0), np.tile(self.square[:, 1], len(rows))
-            seen = seen_samples(sections, eye, around, np.repeat(active[rows], each), uniform)
+            eye = np.repeat(eye, each, axis=0)
+            seen = seen_samples(sections, eye, around, np.repeat(active[rows], each), square[..., 1].ravel())
             yield rows, point[rows], seen, sections.weight.reshape(-1, each)
 
 
@@ -311,7 +308,8 @@ def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
     hidden = np.zeros(len(active), bool)
     if beam.light.kind in ("rectangle", "disk"):
         square = np.stack([(np.arange(_PROBES) + 0.5) / _PROBES, np.full(_PROBES, 0.5)], axis=1)
-        for rows, _, (row, _, weight), whole in _View(beam, square, turn, True).seen(active):
+        points = RayPoints(square, np.zeros((len(active), REPLICATES, 2)), "")
+        for rows, _, (row, _, weight), whole in _View(beam, points, turn, True).seen(active):
             seen = np.bincount(row, weight, whole.size).reshape(whole.shape)
             hidden[rows] = (seen < (1 - _WHOLE) * whole).any(axis=1)
     return hidden
@@ -323,7 +321,7 @@ def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Refl
     They are by replicate, (rays, 3, replicates). The second array says which fraction of the light's solid angle the
     sections of a point have, (rays, replicates) [1].
     """
-    light, reference, each = view.beam.light, view.beam.scene, len(view.square)
+    light, reference, each = view.beam.light, view.beam.scene, len(view.points)
     total, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
     for rows, point, (row, place, weight), whole in view.seen(active):
         if view.even and light.kind == "rectangle":

@@ -171,7 +171,8 @@ def samples_for_rays(
     """Return samples of a light for the airlight of rays.
 
     `light`: the light; `origin`, `direction`, `distance`: of the rays: where they start, (3,) [m], unit vectors, (rays,
-    3), and how far they go, (rays,) [m]; `square`: points of the unit square, (samples, 2) [1], the same for all rays.
+    3), and how far they go, (rays,) [m]; `square`: points of the unit square, (samples, 2) [1], or of each ray, (rays,
+    samples, 2).
     """
     if light.kind == "mesh":
         return _on_triangles(choose_for_rays(light, origin, direction, distance, square), origin, direction)
@@ -187,14 +188,14 @@ def sections_for_points(
 ) -> Sections:
     """Return sections of a light for surface points that lie before it, point by point, even in the solid angle.
 
-    `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square, (samples, 2) [1], the
-    same for all surface points. For flat lights the second number is left for the place in the visible part of a
-    section. `turn`: the angle by which the axis is turned about the way to the light [rad]; `even`: whether rectangles
-    have even azimuths instead of even solid angles.
+    `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square, (samples, 2) [1], or
+    of each surface point, (points, samples, 2). For flat lights the second number is left for the place in the visible
+    part of a section. `turn`: the angle by which the axis is turned about the way to the light [rad]; `even`: whether
+    rectangles have even azimuths instead of even solid angles.
     """
     if light.kind == "mesh":
         chosen = choose_for_points(light, place, square)
-        return _before_triangles(chosen, np.repeat(place, len(square), axis=0), _SHORT * light.radius)
+        return _before_triangles(chosen, np.repeat(place, square.shape[-2], axis=0), _SHORT * light.radius)
     way = light.centre - place
     if light.kind == "sphere":
         return _in_cone(light, place, square)
@@ -211,7 +212,7 @@ def sections_for_points(
     def span(z0: Array, h0: Array, z1: Array, h1: Array) -> Array:
         return np.abs(_cosine(z1, h1) - _cosine(z0, h0))
 
-    phi, per_density = fan.even(square[:, 0]) if even else fan.drawn(square[:, 0], span)
+    phi, per_density = fan.even(square[..., 0]) if even else fan.drawn(square[..., 0], span)
     z0, h0, z1, h1 = fan.section(phi)
     start, end = axes.point(z0, h0, phi), axes.point(z1, h1, phi)
     return _sections(place, axis[:, None], start, end - start, span(z0, h0, z1, h1) * per_density)
@@ -461,7 +462,7 @@ def _on_sphere(light: ReferenceAreaLight, axes: _Axes, distance: Array, square: 
         return middle, rho, -reach, np.where(ends, np.clip(back, -reach, reach), reach)
 
     # The lattice of `reference.quadrature.replicates` is folded in its first coordinate and periodic in the other.
-    folded, periodic = square[:, 0], square[:, 1]
+    folded, periodic = square[..., 0], square[..., 1]
     phi, rate = spread.azimuth(np.where(meets, periodic, folded))
     middle, rho, low, high = circle(phi)
     angle = low + np.where(meets, folded, periodic) * (high - low)
@@ -479,14 +480,16 @@ def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections
     helper /= np.linalg.norm(helper, axis=1)[:, None]
     ratio = np.minimum(light.radius / d, 1.0)
     span = ratio**2 / (1 + np.sqrt((1 - ratio) * (1 + ratio)))  # 1 - cos of the cone
-    down = square[:, 0] * span
+    down = square[..., 0] * span
     cosine, sine = 1 - down, np.sqrt(down * (2 - down))
-    turn = 2 * np.pi * square[:, 1]
+    turn = 2 * np.pi * square[..., 1]
     helper, other = helper[:, None], np.cross(axis, helper)[:, None]
     direction = cosine[..., None] * axis[:, None] + sine[..., None] * (
-        np.cos(turn)[:, None] * helper + np.sin(turn)[:, None] * other
+        np.cos(turn)[..., None] * helper + np.sin(turn)[..., None] * other
     )
     half = np.sqrt(np.maximum((light.radius - d * sine) * (light.radius + d * sine), 0.0))
     found = place[:, None] + (d * cosine - half)[..., None] * direction
-    around = np.cos(turn)[:, None] * other - np.sin(turn)[:, None] * helper  # along the sphere, across the direction
+    around = (
+        np.cos(turn)[..., None] * other - np.sin(turn)[..., None] * helper
+    )  # along the sphere, across the direction
     return _sections(place, around, found, _SHORT * light.radius * around, 2 * np.pi * span)

@@ -100,7 +100,7 @@ class _Mesh:
 
     def chosen(self, worth: Array, square_distance: Array, square: Array) -> Choice:
         """Return a choice of triangles by what groups are worth to each row, (rows, groups)."""
-        rows, samples = len(worth), len(square)
+        rows, samples = len(worth), square.shape[-2]
         total = worth.sum(axis=1, keepdims=True)
         part = np.where(total > 0, 1 - _BY_AREA, 0.0)
         chance = part * worth / np.where(total > 0, total, 1.0) + (1 - part) * self.area / self.area.sum()
@@ -108,11 +108,13 @@ class _Mesh:
         ends /= ends[:, -1:]
         # One search for all rows: that of row k lies between k and k + 1.
         row = np.arange(rows)[:, None]
-        group = np.searchsorted((ends + row).ravel(), (square[:, 0] + row).ravel(), side="right").reshape(rows, samples)
+        group = np.searchsorted((ends + row).ravel(), (square[..., 0] + row).ravel(), side="right").reshape(
+            rows, samples
+        )
         group = np.clip(group - row * len(self.area), 0, len(self.area) - 1)
         its_chance = np.take_along_axis(chance, group, axis=1)
         first = np.take_along_axis(ends, group, axis=1) - its_chance
-        rest = np.clip((square[:, 0] - first) / its_chance, 0.0, 1.0)
+        rest = np.clip((square[..., 0] - first) / its_chance, 0.0, 1.0)
         # Within the group by area.
         low = self.below[self.begin[group]]
         wanted = low + rest * self.area[group]
@@ -121,7 +123,7 @@ class _Mesh:
         rest = np.clip((wanted - self.below[number]) / self.areas[number], 0.0, 1.0)
         its_chance = its_chance * self.areas[number] / self.area[group]
         near = np.take_along_axis(square_distance, group, axis=1) < _CLOSE * self.area[group]
-        within = np.stack([rest, np.broadcast_to(square[:, 1], rest.shape)], axis=-1)
+        within = np.stack([rest, np.broadcast_to(square[..., 1], rest.shape)], axis=-1)
         number = number.ravel()
         return Choice(
             self.triangles[number],

@@ -59,8 +59,8 @@ class ReferenceImage:
     emitted: Array | None = None  #: area lights, or the background, seen directly [W/(m^2 sr)]; None without any
     airlight_se: Array | None = None  #: standard error of the airlight of such lights, or of a sky [W/(m^2 sr)]
     surface_se: Array | None = None  #: of the surface that they light [W/(m^2 sr)]
-    #: means over the image of what area lights add to airlight and surface, by replicate of their points, which all
-    #: pixels share, (2, replicates, 3) [W/(m^2 sr)]
+    #: means over the image of what area lights add to airlight and surface, by replicate of their points, (2,
+    #: replicates, 3) [W/(m^2 sr)]
     replicate_means: Array | None = None
 
 

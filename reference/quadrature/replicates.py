@@ -39,6 +39,12 @@ The light of a sphere is smooth, and periodic in an angle. There a lattice does 
 random shift, folded in the first coordinate by a tent, u = 1 - |2 t - 1|, and in the order of the mirrored digits of i,
 so that every power of two of them is a lattice. For every N from 16 to 16384 the shortest frequency that all N points
 see alike is at least 0.76 sqrt(N).
+
+**Rays.** If all rays had the same points, their errors would be the same too, and the mean of an image no more exact
+than one pixel. Each ray therefore has random digits of its own, by which its points are moved: the exclusive or of the
+digits of coordinates, or a sum modulo 1 in a lattice. A scrambled net, a mirrored pair and a lattice remain what they
+are. Whatever the points before they are moved, each is uniform afterwards, so the mean over the moves is the integral:
+errors of two rays are uncorrelated, and the mean over M rays has the variance of one over M.
 """
 
 from collections.abc import Callable, Mapping
@@ -58,6 +64,8 @@ PILOT = "pilot-"  #: the name of the part of the work that decides
 _PILOT_SEED = 1 << 30  # apart from the seeds of points that count
 REPLICATES = 8  #: independent scramblings
 _LATTICE = np.array([1.0, 1555.0])
+_DIGITS = float(1 << 52)  # that coordinates are moved by: all that a number from 0.5 to 1 has
+_MOVES = 1  # tells their generator from that of the points
 _AHEAD = 4  # times the points of a pilot: the most that it foresees
 _RATE = 1.25  # the power of 1/N by which a standard error is foreseen to fall
 
@@ -92,10 +100,7 @@ def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Ar
         u = 0.5 * (stratum / half + u)
         return np.stack([np.concatenate([u, (2 * stratum + 1) / half - u]), np.concatenate([v, 1 - v])], axis=1)
     if kind == "sphere":
-        place = np.array([mirrored_digits(i) for i in range(plan.most)])
-        place = np.mod(place[:, None] * _LATTICE + generator.random(2), 1.0)
-        place[:, 0] = 1 - np.abs(2 * place[:, 0] - 1)
-        return place
+        return _folded(_lattice(plan.most) + generator.random(2))
     digits = max(1, plan.most - 1).bit_length()
     sobol = (scipy.stats.qmc.Sobol(2, scramble=False).random(plan.most) * (1 << digits)).astype(np.int64)
     return np.stack([_scrambled(column, digits, generator) for column in sobol.T], axis=1)
@@ -108,6 +113,49 @@ def _scrambled(numbers: NDArray[np.int64], digits: int, generator: np.random.Gen
         before, place = numbers >> (digits - digit), digits - digit - 1
         flips |= generator.integers(0, 2, 1 << digit)[before] << place
     return ((numbers ^ flips) + generator.random(len(numbers))) / (1 << digits)
+
+
+def _lattice(count: int) -> Array:
+    """Return the points of a lattice, of which every power of two is one, (count, 2), the second not modulo 1."""
+    return np.array([mirrored_digits(i) for i in range(count)])[:, None] * _LATTICE
+
+
+def _folded(lattice: Array) -> Array:
+    """Return the points of a lattice, (..., 2), modulo 1 and folded in the first coordinate."""
+    place = np.mod(lattice, 1.0)
+    place[..., 0] = 1 - np.abs(2 * place[..., 0] - 1)
+    return place
+
+
+@dataclass(frozen=True)
+class RayPoints:
+    """The points of all replicates for some rays, each moved by what is random for the ray."""
+
+    square: Array  #: replicate after replicate, (points, 2) [1]; of a sphere not folded
+    moves: Array  #: uniform, (rays, replicates, 2) [1]
+    kind: str  #: of the light, or "pairs"
+
+    @classmethod
+    def of(cls, plan: PointPlan, number: int, rays: int, kind: str, part: int = 0) -> "RayPoints":
+        """Return the points of a light for rays, of which `part` is the number of the first."""
+        replicates = range(REPLICATES)
+        if kind == "sphere":
+            square = np.tile(_lattice(plan.most), (REPLICATES, 1))
+        else:
+            square = np.concatenate([square_points(plan, number, replicate, kind) for replicate in replicates])
+        generator = np.random.default_rng((plan.seed, number, plan.most, part, _MOVES))
+        return cls(square, generator.random((rays, REPLICATES, 2)), kind)
+
+    def __len__(self) -> int:
+        return len(self.square)
+
+    def __getitem__(self, rays: slice | Index) -> Array:
+        """Return the points of rays, (rays, points, 2) [1]."""
+        moves = np.repeat(self.moves[rays], len(self.square) // REPLICATES, axis=1)
+        if self.kind == "sphere":
+            return _folded(self.square + moves)
+        digits = ((part * _DIGITS).astype(np.int64) for part in (self.square, moves))
+        return (np.bitwise_xor(*digits) + 0.5) / _DIGITS
 
 
 def mirrored_digits(number: int) -> float:
@@ -151,7 +199,7 @@ def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
         needed = np.clip(count * excess ** (1 / _RATE) / plan.first, 1.0, plan.most / plan.first)
         near = needed * plan.first <= _AHEAD * count
         foreseen = plan.first << np.ceil(np.log2(needed)).astype(int)
-        counts[active[near]] = np.maximum(foreseen[near], 2 * count)
+        counts[active[near]] = np.maximum(foreseen[near], count)
         active, count = active[~near & (foreseen < plan.most)], _AHEAD * count
     return counts
 

@@ -7,11 +7,10 @@ wrote. It attenuates over a shadow ray that ends a relative epsilon before the l
 compared with the quadrature image of *that* integral, exp(-sigma_t (x + (1 - epsilon) r)), with the epsilon measured on
 this machine. The bias without this correction is given beside it.
 
-Under area lights the quadrature has its own standard errors, and both sides' count. All its pixels share the points
-of the lights, so that their errors add up: the interval of the image takes the spread of its replicates' means, as it
-takes that of whole batches of the samplers. volpath's light comes in part by rays that the phase function sends on,
-which are not shortened: the bias that is corrected for is the most that the epsilon can do, and the one without
-correction is given beside it.
+Under area lights the quadrature has standard errors of its own, and both sides' count: the interval of the image takes
+the spread of its replicates' means, as it takes that of whole batches of the samplers. volpath's light comes in part by
+rays that the phase function sends on, which are not shortened: the bias that is corrected for is the most that the
+epsilon can do, and the one without correction is given beside it.
 
 Rays that pass closer to a light than `MASK_PIXELS` pixel widths are left out: the contribution of one path there is
 bounded only by 1/h^2, so that no number of samples gives a standard error to trust (DESIGN section 6.6). Lights with
@@ -38,9 +37,6 @@ from validation.statistics.comparison import Estimate, compare_statistics
 from validation.statistics.records import Agreement, Statistics
 
 MASK_PIXELS = 2.0
-#: The least margin under area lights, where the quadrature has its own errors: 3.4e-4 of the mean airlight of
-#: `penumbra-plane`, 8e-4 with the factor of Student's law for eight replicates. No batch makes it less.
-WIDE_MARGIN = 0.0025
 _LEAST_BATCHES = 32  # below, the standard error of a standard error exceeds 13 %
 _SAMPLES = 64  # a pixel in each batch
 _PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
@@ -54,6 +50,7 @@ def agreement(
     batches: int = 256,
     samples: int = _SAMPLES,
     seconds: float | None = None,
+    points: int | None = None,
     spread: ElsewhereFor | None = None,
 ) -> dict[str, Agreement]:
     """Compare an estimator with the quadrature image of a Mitsuba scene at its own size.
@@ -64,12 +61,13 @@ def agreement(
     The `mi.Scene` may be small, since all pixels are pooled. The estimator, 'volpath' or 'single-scatter', agrees if
     the 95 % interval of the relative bias lies inside +- `margin`. At most `batches` are traced, of `samples` a
     pixel each; volpath places its samples where its pilot spread most (`reference.monte_carlo.allocation`). After
-    `seconds`, the pilot not counted, no further batch is traced; `spread` lets other processes trace some. The result
-    is by layer, without the surface where nothing lit is visible.
+    `seconds`, the pilot not counted, no further batch is traced; `spread` lets other processes trace some. `points` are
+    those of area lights in the quadrature (`validation.estimates.quadrature.reference_image`). The result is by layer,
+    without the surface where nothing lit is visible.
     """
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
-    plain = reference_image(scene)
-    shortened = reference_image(scene, shadow_scale=1 - epsilon) if epsilon else plain
+    plain = reference_image(scene, points=points)
+    shortened = reference_image(scene, shadow_scale=1 - epsilon, points=points) if epsilon else plain
     masks = layer_masks(read_reference(scene), plain)
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]
 
@@ -127,20 +125,19 @@ def agreements(
     batches: int = 256,
     samples: Mapping[str, int] | None = None,
     seconds: float | None = None,
+    points: int | None = None,
     spread: ElsewhereFor | None = None,
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 
-    By estimator there are the `margins` of the relative bias [1], under area lights at least `WIDE_MARGIN`, and
-    the `samples`; each takes so many `batches` and `seconds` at most. The result is by estimator and layer, as in
-    'volpath airlight'.
+    By estimator there are the `margins` of the relative bias [1] and the `samples`; each takes so many `batches` and
+    `seconds` at most; `points`: see `agreement`. The result is by estimator and layer, as in 'volpath airlight'.
     """
     by_name: dict[str, Agreement] = {}
-    least = WIDE_MARGIN if read_reference(scene).area else 0.0
     for estimator, margin in margins.items():
         how: dict[str, Any] = {"batches": batches, "samples": (samples or {}).get(estimator, _SAMPLES)}
-        how |= {"seconds": seconds, "spread": spread}
-        by_layer = agreement(scene, estimator=estimator, margin=max(margin, least), **how)
+        how |= {"seconds": seconds, "points": points, "spread": spread}
+        by_layer = agreement(scene, estimator=estimator, margin=margin, **how)
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name
 
@@ -148,9 +145,9 @@ def agreements(
 def reference_estimate(image: ReferenceImage, layer: str, test: Estimate, mask: Bools) -> Estimate:
     """Return a layer of a quadrature image as the reference of a comparison of the pixels of a mask with some batches.
 
-    Under area lights it has standard errors, of `REPLICATES` scramblings. All pixels share their points: the mean over
-    the image of each replicate says how their errors add up. A value that no sample of the batches reached has no
-    standard error of theirs, and must not be judged by that of the quadrature alone.
+    Under area lights it has standard errors, of `REPLICATES` scramblings, and the mean over the image of each. A value
+    that no sample of the batches reached has no standard error of theirs, and must not be judged by that of the
+    quadrature alone.
     """
     error = reference_error(image, layer)
     reached = np.asarray(test.standard_error) > 0

@@ -132,7 +132,7 @@ class SceneStudy:
         kept = reference_image.is_kept(self.loaded.scene, points=self.study.points)
         parts["reference"] = 0.0 if kept else reference_work(self.size, lights=lights).seconds
         with self.at(checks.size) as scene:
-            kept = check_reference.is_kept(scene, checks)
+            kept = check_reference.is_kept(scene, checks, self.study.points)
         parts["checks"] = 0.0 if kept else len(checks.margins) * (checks.patience or 60.0)
         batches, samples = checks.multiple
         with self.at(_MULTIPLE) as scene:
@@ -209,7 +209,7 @@ def study_scene(
     reference, checks = study.kept_reference, study.study.checks
     progress("checks")
     with study.at(checks.size) as scene:
-        agreement = check_reference.result(scene, checks, spread=spread)
+        agreement = check_reference.result(scene, checks, study.study.points, spread=spread)
     progress("multiple scattering")
     with study.at(_MULTIPLE) as scene:
         multiple = multiple_scattering.result(scene, *checks.multiple)
@@ -241,11 +241,12 @@ def configurations_for(features: SceneFeatures, configurations: Sequence[Configu
 
 
 @kept("scene-checks")
-def check_reference(scene, checks: Checks, *, spread: ElsewhereFor | None = None) -> dict[str, Agreement]:
+def check_reference(
+    scene, checks: Checks, points: int | None = None, *, spread: ElsewhereFor | None = None
+) -> dict[str, Agreement]:
     """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
-    return agreements(
-        scene, checks.margins, batches=checks.batches, samples=checks.samples, seconds=checks.patience, spread=spread
-    )
+    how: dict[str, Any] = {"batches": checks.batches, "samples": checks.samples, "seconds": checks.patience}
+    return agreements(scene, checks.margins, points=points, spread=spread, **how)
 
 
 @kept("scene-multiple")
