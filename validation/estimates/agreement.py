@@ -62,11 +62,12 @@ def agreement(
     the 95 % interval of the relative bias lies inside +- `margin`. At most `batches` are traced, of `samples` a
     pixel each; volpath places its samples where its pilot spread most (`reference.monte_carlo.allocation`). After
     `seconds`, the pilot not counted, no further batch is traced; `spread` lets other processes trace some. `points` are
-    those of area lights in the quadrature (`validation.estimates.quadrature.reference_image`). The result is by layer,
+    those of area lights in the reference of volpath (`validation.estimates.quadrature.reference_image`), whose margins
+    are wider; single-scatter is compared with as many as the error of a pixel needs. The result is by layer,
     without the surface where nothing lit is visible.
     """
     epsilon = measure_shadow_epsilon() if estimator == "volpath" else 0.0
-    plain = reference_image(scene, points=points)
+    plain = reference_image(scene)
     shortened = reference_image(scene, shadow_scale=1 - epsilon, points=points) if epsilon else plain
     masks = layer_masks(read_reference(scene), plain)
     layers = [layer for layer in LAYERS if np.any(getattr(plain, layer) > 0)]

@@ -275,12 +275,15 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
 
     It is judged by its preparation once kernels are compiled and, where that takes long and for a user's method, by the
     second frame of a small scene, whose preparation takes as long. If there are many groups of lights, only the first
-    are prepared before the frame; the others take as long each. Nothing is judged where making the renderer `took` so
-    little [s] that a frame is far below the limit.
+    are prepared before the frame; the others take as long each. Nothing is judged where there is one group, and making
+    the renderer `took` so little [s] that a frame is far below the limit.
     """
     chosen, limit = cell.chosen, cell.measure.limit
-    if limit is None or not (chosen.own or took * len(light_groups(renderer)) > _DOUBTFUL * limit):
+    many = len(light_groups(renderer)) > 1
+    if limit is None or not (chosen.own or many or took > _DOUBTFUL * limit):
         return None
+    if many:
+        renderer.prepare(renderer.scene)  # compiles
     states, milliseconds, _ = timed(lambda: renderer.prepare(renderer.scene))
     preparation = 1e-3 * milliseconds * len(states) / sum(state is not None for state in states)
     del states
