@@ -16,8 +16,7 @@ from reports.api.inputs import (
     Size,
     Values,
     changes_of,
-    exclude,
-    kernel_name,
+    configuration_of,
     note,
     one_error,
     pixels_of,
@@ -146,17 +145,7 @@ def view(
     host, _, digits = address.rpartition(":")
     if not host or not digits.isdecimal() or not (port := int(digits)) <= 65535:
         raise InputError(f"address: got {address!r}, expected HOST:PORT, a port from 0, any free one, to 65535")
-    from validation.study.configuration import Configuration, configuration
-
-    if isinstance(method, Configuration):
-        exclude(
-            "method",
-            "a configuration has its own kernel and parameters",
-            {"kernel": kernel, **dict.fromkeys(parameters, True)},
-        )
-        chosen = method
-    else:
-        chosen = configuration(method, kernel_name(kernel), parameters)
+    chosen = configuration_of(method, kernel, parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()
     from reports.view.server import Server

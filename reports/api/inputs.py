@@ -170,6 +170,17 @@ def kernel_name(kernel: Any) -> str | None:
     return f"{module}:{name}"
 
 
+def configuration_of(method: Any, kernel: Any, parameters: Any) -> "Configuration":
+    """Return a configuration of a method, or the one that is given, which excludes a kernel and parameters."""
+    from validation.study.configuration import Configuration, configuration
+
+    if not isinstance(method, Configuration):
+        return configuration(method, kernel_name(kernel), parameters or {})
+    beside = {"kernel": kernel, **dict.fromkeys(parameters or (), True)}
+    exclude("method", "a configuration has its own kernel and parameters", beside)
+    return method
+
+
 @contextmanager
 def telling(progress: Any, title: str) -> Iterator[Callable[[float, str], None]]:
     """Yield a function (fraction done, what) that calls `progress`, shows a bar for True, or does nothing for None."""

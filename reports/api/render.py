@@ -22,6 +22,7 @@ from reports.api.inputs import (
     Size,
     Values,
     changes_of,
+    configuration_of,
     exclude,
     kernel_name,
     note,
@@ -244,18 +245,15 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
     from validation.study.configuration import Configuration, configuration
 
     if isinstance(method, Configuration):
-        beside = {"kernel": kernel, **dict.fromkeys(parameters or (), True)}
-        exclude("method", "a configuration has its own kernel and parameters", beside)
-        return method, method.own
+        return configuration_of(method, kernel, parameters), method.own
     if isinstance(method, str) and is_shader(method):
         require_opengl()
-    name = kernel_name(kernel)
     apart = (isinstance(method, str) and ":" in method) or (isinstance(kernel, str) and ":" in kernel)
     if not apart:
-        return configuration(method, name, parameters or {}), False
+        return configuration_of(method, kernel, parameters), False
     from reports.machine.own_process import in_own_process
 
-    return in_own_process(configuration, method, name, parameters or {}, name=method), True
+    return in_own_process(configuration, method, kernel_name(kernel), parameters or {}, name=method), True
 
 
 def _ready(asked: _Asked, frames: int, layers: bool, progress: Progress) -> tuple[Any, Any, Any, bool]:
