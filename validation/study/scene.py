@@ -245,8 +245,15 @@ def check_reference(
     scene, checks: Checks, points: int | None = None, *, spread: ElsewhereFor | None = None
 ) -> dict[str, Agreement]:
     """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
-    how: dict[str, Any] = {"batches": checks.batches, "samples": checks.samples, "seconds": checks.patience}
-    return agreements(scene, checks.margins, points=points, spread=spread, **how)
+    return agreements(
+        scene,
+        checks.margins,
+        batches=checks.batches,
+        samples=checks.samples,
+        seconds=checks.patience,
+        points=points,
+        spread=spread,
+    )
 
 
 @kept("scene-multiple")

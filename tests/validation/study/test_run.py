@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 from analytic.errors import InputError
+from realtime.frame.renderer import FrameRenderer
 from realtime.memory import Memory
 from realtime.methods.unshadowed import unshadowed
 from realtime.scene.read_scene import SceneFeatures, read_scene
@@ -154,6 +155,23 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(monkeypatc
     assert (row.status, row.error, row.times) == ("left out", None, None)
     assert "by a frame of 8 x 6 pixels" in row.reason
     assert "more than the limit of 0.3 s" in row.reason
+
+
+@pytest.mark.usefixtures("variant")
+def test_a_frame_is_judged_by_the_preparation_of_all_its_groups_of_lights(monkeypatch):
+    """Making the renderer takes no time, and a preparation a second."""
+    clock, prepare = Clock(), FrameRenderer.prepare
+
+    def slowed(renderer, scene):
+        clock.now += 1
+        return prepare(renderer, scene)
+
+    monkeypatch.setattr("validation.clock.time", clock)
+    monkeypatch.setattr(FrameRenderer, "prepare", slowed)
+    monkeypatch.setattr(module, "light_groups", lambda renderer: ("first", "second"))
+    row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.5))[0]
+    assert (row.status, row.error, row.times) == ("left out", None, None)
+    assert "what a frame prepares takes 1 s, more than the limit of 0.5 s" in row.reason
 
 
 class Clock:
