@@ -92,7 +92,7 @@ class Noise:
             kind = "brighter" if self.largest_deviation > 0 else "darker"
             return (
                 f"whether there is a bias cannot be told: one value has {100 * self.largest_fraction:.2g} % of the "
-                f"variance of {self.runs} runs, so still {kind} ones may be missing; expected more runs"
+                f"variance of {self.runs} runs, so still {kind} ones may be missing; add runs"
             )
         if low <= 0 <= high and self.root_bias is None:
             return f"no bias in {self.runs} runs; one of {100 * self.detectable_bias:.2g} % would have been found"
