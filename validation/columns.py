@@ -49,6 +49,19 @@ def columns_of(record: type) -> tuple[Column, ...]:
     return tuple(_columns(record, ""))
 
 
+@cache
+def described(record: type) -> dict[str, Column]:
+    """Return the descriptions of the fields of a data class by name; one that is no number and no text has no kind."""
+    hints, found = get_type_hints(record), {}
+    for each in fields(record):
+        kind = _kind(hints[each.name])
+        heading, unit, meaning = each.metadata.get(_COLUMN, ("", None, ""))
+        usual = "1" if kind in (int, float) else ""
+        heading, unit = heading or each.name.replace("_", " "), usual if unit is None else unit
+        found[each.name] = Column(each.name, heading, unit, meaning, _KINDS.get(kind, ""))
+    return found
+
+
 def values_of(record: Any) -> dict[str, Any]:
     """Return the values of a record by the keys of its columns, and `NAME.KEY` for what its mappings hold."""
     return flat({each.name: getattr(record, each.name) for each in fields(record)})
@@ -103,17 +116,14 @@ def record_of(data: Any, kind: type[_Record]) -> _Record:
 
 def _columns(record: Any, prefix: str) -> Iterator[Column]:
     hints = get_type_hints(record)
-    for each in fields(record):
-        kind = _kind(hints[each.name])
-        heading, unit, meaning = each.metadata.get(_COLUMN, ("", None, ""))
-        heading = heading or each.name.replace("_", " ")
+    for name, own in described(record).items():
+        kind = _kind(hints[name])
         if is_dataclass(kind):
-            for inner in _columns(kind, f"{prefix}{each.name}."):
-                words = f"{meaning}: {inner.meaning}" if meaning else inner.meaning
-                yield replace(inner, heading=f"{heading}, {inner.heading}", meaning=words)
-        elif kind in _KINDS:
-            usual = "1" if kind in (int, float) else ""
-            yield Column(prefix + each.name, heading, usual if unit is None else unit, meaning, _KINDS[kind])
+            for inner in _columns(kind, f"{prefix}{name}."):
+                words = f"{own.meaning}: {inner.meaning}" if own.meaning else inner.meaning
+                yield replace(inner, heading=f"{own.heading}, {inner.heading}", meaning=words)
+        elif own.kind:
+            yield replace(own, key=prefix + name)
 
 
 def _kind(hint: Any) -> Any:

@@ -181,6 +181,6 @@ def report_keys(*parts: str) -> str:
     found = []
     for part in parts or ("report",):
         record = record_types()[part.title().replace("-", "")]
-        rows = [(f"`{name}`", what) for name, what in meanings(record, units=True).items()]
+        rows = [(f"`{name}`", what) for name, what in meanings(record).items()]
         found.append((f"**{part.replace('-', ' ')}**\n\n" if parts else "") + table(("key", "what it is"), rows, 2))
     return "\n".join(found)

@@ -19,6 +19,7 @@ from reports.api.inputs import (
     exclude,
     listed,
     one_error,
+    output_files,
     scene_names,
     several,
     telling,
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
     from reference.storage.exr import Image
     from reports.api.comparisons import Fitted, ImageComparison, SceneComparison
     from reports.tables.record import Said
-
-_ENDINGS = (".exr", ".png")
 
 
 @one_error
@@ -113,14 +112,13 @@ def compare(
     >>> abs(fitted["sigma_t"].value / 0.173 - 1) < 1e-4
     True
     """
-    files = [Path(path) for path in several(output)]
     layer, _, holds = (layer or "").partition("=") if "=" in (layer or "") else (layer, "", None)
     if holds not in (None, "airlight", "surface", "total"):
         raise InputError(f"layer: got {holds!r} as the content of {layer}, expected airlight, surface or total")
     scene = reference if _is_scene(reference) else None
     if scene is None and _is_scene(test) and not Path(str(test)).is_file():
         raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
-    about: dict[str, Any] = {"output": files, "margin": margin, "all_metrics": all_metrics}
+    about: dict[str, Any] = {"output": several(output), "margin": margin, "all_metrics": all_metrics}
     if scene is None:
         of_scenes = {"the content of the layer": holds, "pixel": pixel, "diagnose": diagnose, "fit": fit}
         exclude("compare", "two images have no scene", {**of_scenes, "frames": frames})
@@ -132,8 +130,7 @@ def compare(
         exclude("compare", "several files are judged together", about | {"mask": mask, "margin": None})
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
         return _several(str(scene), test, frames, progress=progress, **how)
-    for path in files:
-        _check_difference(path)
+    files = output_files(output, ".exr (values)", ".png (a picture)")
     if fit is not None:
         return _fit(scene, test, fit, layer=layer, holds=holds, pixel=pixel, mask=mask, progress=progress)
     options: dict[str, Any] = {"mask": mask, "margin": margin, "all_metrics": all_metrics}
@@ -179,14 +176,6 @@ def _is_scene(word: Any) -> bool:
     path, name = Path(word), str(word)
     known = name in scene_names() or name.startswith("random:")
     return known or path.suffix.lower() == ".xml" or not (path.suffix or path.exists())
-
-
-def _check_difference(path: Path) -> None:
-    from reference.storage.files import ensure_writable
-
-    if path.suffix.lower() not in _ENDINGS:
-        raise InputError(f"output: got {str(path)!r}, expected a name that ends in .exr (values) or .png (a picture)")
-    ensure_writable(path)
 
 
 @contextmanager

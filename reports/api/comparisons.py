@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Comparisons as results: two images, an image with the reference of its scene, its diagnosis, its fit."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -19,6 +18,7 @@ from reports.plotting.pictures import (
     error_map,
     exposure,
     png_bytes,
+    relative_error,
     tone_mapped,
     write_png,
 )
@@ -30,7 +30,7 @@ from validation.engine.diagnose import Diagnosis
 from validation.engine.judge import EngineComparison
 from validation.fit.fit import Fit
 from validation.fit.fit import Fitted as FittedParameter
-from validation.metrics.errors import FLOOR, Metrics, colours
+from validation.metrics.errors import Metrics, colours
 from validation.motion.judge import MotionComparison
 from validation.motion.noise import NoiseComparison
 
@@ -53,10 +53,7 @@ class ImageComparison(Comparison, Pictured):
     def error(self) -> Array:
         """The signed relative error (test - ref) / max(ref, 0.001 mean(ref)), of the shape of the images."""
         reference, test = (np.asarray(values, dtype=np.float64) for values in (self.reference, self.test))
-        finite = np.isfinite(reference) & np.isfinite(test)
-        mean = float(reference[finite].mean()) if finite.any() else math.nan
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return read_only((test - reference) / np.maximum(reference, FLOOR * mean))
+        return read_only(relative_error(reference, test))
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `airlight compare --json` prints."""
@@ -148,7 +145,6 @@ def frames_comparison(compared: MotionComparison | NoiseComparison) -> Said:
     """Return how far frames are from the reference of each, or independent renders from theirs."""
     return Said(
         name=f"{compared.files} against {compared.scene}",
-        data=plain(compared),
         lines=compared.lines,
         good=not compared.failures,
         of=compared,
@@ -171,7 +167,6 @@ def fitted(fit: Fit) -> Fitted:
     rows = [(each.name, each.value, Interval.of((each.low, each.high)), each.scene) for each in fit.parameters]
     return Fitted(
         name=f"{fit.path} as {fit.scene}: {values}; relative RMSE left {fit.residual:.3g}",
-        data=plain(fit),
         tables=(table("Parameters that explain the image", (*words(name="parameter"), *columns), rows),),
         lines=fit.lines,
         good=not fit.failures,
@@ -188,26 +183,23 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
     difference.
     """
     reference, test = (np.asarray(values, dtype=np.float64) for values in (reference, test))
-    if kept is not None:
-        test = np.where(np.asarray(kept)[..., None], test, reference)
+    seen = np.ones_like(reference, dtype=bool) if kept is None else np.asarray(kept)[..., None]
     if path.suffix.lower() == ".png":
-        write_png(path, error_map(reference, test))
+        write_png(path, error_map(reference, np.where(seen, test, reference)))
         return (
             f"signed relative error, blue too dark, red too bright, from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
         )
     from reference.storage.exr import write_exr
 
-    finite = np.isfinite(reference) & np.isfinite(test)
-    difference = np.subtract(test, reference, out=np.zeros_like(test), where=finite)
-    seen = finite if kept is None else finite & np.asarray(kept)[..., None]
-    mean = float(reference[seen].mean()) if seen.any() else 0.0
-    floor = np.maximum(np.where(finite, reference, 0), FLOOR * mean)
-    relative = np.divide(difference, floor, out=np.zeros_like(test), where=floor > 0)
+    relative = relative_error(np.where(seen, reference, np.nan), test)
+    compared = ~np.isnan(relative)
+    difference = np.subtract(test, reference, out=np.zeros_like(test), where=compared)
+    shown = np.where(np.isfinite(relative), relative, 0)
     attributes: dict[str, str | int | float] = {
         "airlight:difference": "test - reference",
-        "airlight:not_finite": int((~finite.all(axis=-1)).sum()),
+        "airlight:not_finite": int((seen & ~compared).any(axis=-1).sum()),
     }
-    write_exr(path, Image({"total": difference, "relative": relative}, attributes=attributes))
+    write_exr(path, Image({"total": difference, "relative": shown}, attributes=attributes))
     return "test - reference in R, G, B, over the reference in the layer relative"
 
 

@@ -19,8 +19,8 @@ from reports.api.inputs import (
     configuration_of,
     note,
     one_error,
+    output_files,
     pixels_of,
-    several,
 )
 from reports.tables.record import Said
 
@@ -50,13 +50,7 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
     InputError
         For a scene without a reference, with the name of what is in the way.
     """
-    from reference.storage.files import ensure_writable
-
-    files = [Path(path) for path in several(output)]
-    for path in files:
-        if path.suffix.lower() not in (".glb", ".vol"):
-            raise InputError(f"output: got {path}, expected a name that ends in .glb or .vol, such as {path.stem}.glb")
-        ensure_writable(path)
+    files = output_files(output, ".glb", ".vol")
     from reports.machine.environment import activate
 
     activate()

@@ -8,7 +8,7 @@ from typing import Literal
 
 from analytic.errors import InputError
 from reports import __version__
-from reports.api.inputs import Files, one_error, several
+from reports.api.inputs import Files, one_error, output_files
 from reports.tables.record import Result
 
 #: The largest errors, as `python -m tests.helpers.exported` measured them.
@@ -82,15 +82,13 @@ def export(
     """
     from realtime.export.text import kernel_text
     from realtime.scene.phase import named_phase
-    from reference.storage.files import ensure_writable, write_text
+    from reference.storage.files import write_text
 
     if phase.startswith(("hg:", "tabulated", "mie")):
         raise InputError(
             f"phase: got {phase!r}, expected isotropic, rayleigh, hazy, murky, hg (g is an argument) or hg-draine:D"
         )
-    files = [Path(path) for path in several(output)]
-    for path in files:
-        ensure_writable(path)
+    files = output_files(output)
     rows = _rows(phase) if test else ()
     code = kernel_text(kernel, named_phase(phase), language, rows)
     error, words = _measured(kernel, phase)

@@ -121,6 +121,18 @@ def _is_given(value: Any) -> bool:
     return value is not None and value is not False and not (isinstance(value, list | tuple) and not value)
 
 
+def output_files(output: Any, *endings: str) -> list[Path]:
+    """Return the files to write, once each is known to have an ending, such as '.png (a picture)', and a place."""
+    from reference.storage.files import ensure_writable
+
+    files = [Path(path) for path in several(output)]
+    for path in files:
+        if endings and path.suffix.lower() not in [words.split()[0] for words in endings]:
+            raise InputError(f"output: got {str(path)!r}, expected a name that ends in {' or '.join(endings)}")
+        ensure_writable(path)
+    return files
+
+
 def listed(name: str, words: Any) -> list[str]:
     """Return the words of a list, or of a text with commas between them; none may be empty."""
     parts = words.split(",") if isinstance(words, str) else [str(word) for word in words]

@@ -27,6 +27,7 @@ from reports.api.inputs import (
     kernel_name,
     note,
     one_error,
+    output_files,
     pixels_of,
     several,
     telling,
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from reports.tables.record import Said
     from validation.study.configuration import Configuration
 
-_ENDINGS = (".exr", ".png")
 _STAGES = ("surface", "shade", "render")  # the recorded functions of a frame
 
 
@@ -151,7 +151,7 @@ def render(
     >>> frame.airlight.shape, frame.airlight.dtype.name
     ((24, 32, 3), 'float32')
     """
-    files = [Path(path) for path in several(output)]
+    files = output_files(output, ".exr (all layers)", ".png (a picture)")
     _check(files, samples=samples, frames=frames, animate=animate, plan=plan, timed=timed)
     for name, number in (("run", run), ("frame", frame)):
         if not 0 <= number < 2**31:
@@ -160,6 +160,7 @@ def render(
 
     activate()  # a user's module may need a variant when it is imported
     from realtime.methods.shader.source import is_shader
+    from reports.plotting.pictures import tone_curve
 
     named = checked_configuration(method, kernel, parameters)
     chosen, apart = named
@@ -179,7 +180,8 @@ def render(
     rendered: Rendering = call(_frame, asked, samples, timed, progress)
     for path in files:
         rendered.save(path)
-    return replace(rendered, files=tuple(map(str, files)))
+    curve = tone_curve(rendered.total).words if any(path.suffix.lower() == ".png" for path in files) else None
+    return replace(rendered, files=tuple(map(str, files)), tone_curve=curve)
 
 
 @dataclass(frozen=True)
@@ -211,9 +213,7 @@ class _Asked:
 def _check(
     files: list[Path], *, samples: int, frames: int | None, animate: str | None, plan: bool, timed: bool
 ) -> None:
-    """Refuse files that cannot be written, and options that do not go together, before any work."""
-    from reference.storage.files import ensure_writable
-
+    """Refuse options that do not go together before any work."""
     for name, value in (("samples", samples), ("frames", frames)):
         if value is not None and value < 1:
             raise InputError(f"{name}: got {value}, expected 1 or more")
@@ -227,12 +227,6 @@ def _check(
     if frames is not None:
         single = {"samples": samples > 1, "timed": timed}
         exclude("frames", "an animation has one ray a pixel and says what its frames cost", single)
-    for path in files:
-        if path.suffix.lower() not in _ENDINGS:
-            raise InputError(
-                f"output: got {str(path)!r}, expected a name that ends in .exr (all layers) or .png (a picture)"
-            )
-        ensure_writable(path if frames is None else _numbered(path, 1, frames))
 
 
 def checked_configuration(method: Any, kernel: Any = None, parameters: Any = None) -> "tuple[Configuration, bool]":

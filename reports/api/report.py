@@ -342,14 +342,12 @@ def diff(
     """
     from reports.data.reader import read_report
     from reports.diff.compare import compare_reports, difference_lines, difference_tables
-    from validation.columns import plain
 
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
     found = compare_reports(*reports, time_tolerance=tolerance)
     return Said(
         name=f"{new} against {old}",
-        data=plain(found),
         tables=difference_tables(found),
         lines=difference_lines(found),
         good=not found.worse,
@@ -391,7 +389,7 @@ def paper(
     from reference.storage.kept import date
     from reports.machine.environment import activate, describe_environment
     from reports.report.others import measure_claims
-    from reports.tables.papers import count_words, number_tables, verdict_tables
+    from reports.tables.papers import count_words, paper_tables
     from validation.columns import plain
     from validation.papers.claims import claims, papers
 
@@ -411,5 +409,5 @@ def paper(
     counted = count_words([row for row in rows if row.verdict is not None])
     lines = [f"{counted}.", *([f"{left_out} more rows need images: leave out --quick."] if left_out else []), *written]
     data = {"measured": date(), "environment": describe_environment(), "papers": plain(rows), "left_out": left_out}
-    tables = [*verdict_tables(rows), *(number_tables(rows) if name is not None else [])]
+    tables = paper_tables(rows, plain=name is not None)
     return Said(name=counted, data=data, tables=tables, lines=lines, of=tuple(rows))

@@ -9,7 +9,7 @@ reference, whose error is far below what float32 can hold.
 import os
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -75,7 +75,7 @@ class LayeredImage(Pictured):
     """Layers of radiance and the depth, shared by renderings and references; see the module."""
 
     scene: str  #: name of the scene
-    image: Image  #: the layers as they are written to a file, with what made them
+    image: Image = field(repr=False)  #: the layers as they are written to a file, with what made them
 
     @property
     def airlight(self) -> Array:
@@ -117,6 +117,10 @@ class LayeredImage(Pictured):
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Array:
         return as_array(self.total, dtype, copy)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields of the record and the size, as JSON has them."""
+        return super().to_dict() | {"size": list(self.size)}
 
     def with_total(self) -> Image:
         """Return the layers and the total among them."""
@@ -178,22 +182,7 @@ class Rendering(LayeredImage):
     samples: int = 1  #: rays a pixel
     device: str = ""  #: where it was rendered
     files: tuple[str, ...] = ()  #: that were written
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the data that `airlight render --json` prints, with times [ms] if they were measured."""
-        data: dict[str, Any] = {"scene": self.scene, "method": self.label, "size": list(self.size)}
-        if self.times is not None:
-            times = self.times.medians
-            data["stages"] = [
-                {"name": name, "ms": times.pop(name)} for name in ("surface", "airlight") if name in times
-            ]
-            data |= {f"{name}_ms": time for name, time in times.items()} | {"fps": 1000 / times["frame"]}
-        curve = self._curve().words if any(name.lower().endswith(".png") for name in self.files) else None
-        made = {"samples": self.samples, "tone_curve": curve, "files": list(self.files), "device": self.device}
-        return data | made
-
-    def _curve(self) -> ToneCurve:
-        return tone_curve(self.total)
+    tone_curve: str | None = None  #: of the pictures among these
 
     @property
     def lines(self) -> Sequence[str]:
@@ -213,8 +202,7 @@ class Rendering(LayeredImage):
                     f"  {self.device}",
                 ]
             )
-        data = self.to_dict()
-        lines += [f"  picture: {data['tone_curve']}"] if data["tone_curve"] else []
+        lines += [f"  picture: {self.tone_curve}"] if self.tone_curve else []
         if self.samples > 1:
             lines.append(f"  {self.samples} rays a pixel: a picture; a method's error is measured at pixel centres")
         return [*lines, *_written(self.files, self.size)]
@@ -250,17 +238,11 @@ class Reference(LayeredImage):
         return self.image.layers.get("surface_se")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the data that `airlight reference --json` prints, without the files."""
-        means = {name: layer.mean(axis=(0, 1)).tolist() for name, layer in self.image.layers.items()}
-        names = (name for name in _MADE if f"airlight:{name}" in self.image.attributes)
-        data: dict[str, Any] = {"scene": self.scene, "estimator": self.estimator, "means": means}
-        data |= {name: self.image.attributes[f"airlight:{name}"] for name in names}
-        if isinstance(self.how, MonteCarloReference):
-            data |= {name: getattr(self.how, name) for name in ("cached", "damaged", "masked", "reached")}
-            data |= {f"{name}_error": error for name, error in self.how.errors.items()}
-        elif self.how is not None:
-            data |= asdict(self.how)
-        return plain(data)
+        """Return the fields of the record, the means of the layers, and what the header says of the samples."""
+        means = {name: layer.mean(axis=(0, 1)) for name, layer in self.image.layers.items()}
+        said = {name: self.image.attributes.get(f"airlight:{name}") for name in _MADE}
+        known = {name: value for name, value in said.items() if value is not None}
+        return super().to_dict() | plain({"means": means, **known})
 
     @property
     def passed(self) -> bool:

@@ -135,13 +135,11 @@ def _findings(source: Path, target: Path | None) -> Said:
     """Write what the rows of a sweep say, and return it."""
     from reports.sweep.page import write_sweep
     from reports.sweep.tables import errors_table, speed_table
-    from validation.columns import plain
 
     said, page = write_sweep(source, target)
     count = f"{said.scenes} scenes, {len(said.samples)} configurations, {len(said.sweep)} cells"
     return Said(
         name=str(page),
-        data=plain(said),
         claims=[f"{each.kind}: {each.text}" for each in said.headlines],
         tables=(errors_table(said), speed_table(said)),
         lines=(f"{page}: {count}",),

@@ -26,7 +26,7 @@ from reports import __version__
 from reports.api.compare import compare
 from reports.api.explore import describe, view
 from reports.api.export import export
-from reports.api.inputs import Files
+from reports.api.inputs import Files, output_files
 from reports.api.reference import reference
 from reports.api.render import render
 from reports.api.report import diff, paper, report
@@ -129,7 +129,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
 
     def command(*arguments: Any, **options: Any) -> int:
         json = options.pop("json", False)
-        files = [Path(path) for path in options.pop("output", ())] if endings else []
+        files = output_files(list(options.pop("output", ())), *endings) if endings else []
         settings = options.pop("settings", ()) if "settings" not in own else ()
         if settings:
             from validation.study.configuration import parse_settings
@@ -137,7 +137,6 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             options |= parse_settings(list(settings))
         if "progress" in own:
             options["progress"] = True
-        _check_files(files, endings)
         result = function(*arguments, **options)
         for path in files:
             result.save(path)
@@ -158,17 +157,6 @@ def _help(function: Callable[..., Any], *, whole: bool) -> str:
     description = inspect.getdoc(function) or ""
     description = re.split(r"\n\n[A-Z][a-z]+\n---", description)[0]
     return _plain(description if whole else description.split("\n\n")[0])
-
-
-def _check_files(files: Sequence[Path], endings: Sequence[str]) -> None:
-    """Refuse files that cannot be written, before any work."""
-    from analytic.errors import InputError
-    from reference.storage.files import ensure_writable
-
-    for path in files:
-        if path.suffix.lower() not in endings:
-            raise InputError(f"output: got {str(path)!r}, expected a name that ends in {', '.join(endings)}")
-        ensure_writable(path)
 
 
 def _printed(result: Result | None, files: Sequence[Path], *, json: bool) -> int:

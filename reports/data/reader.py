@@ -4,13 +4,13 @@
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict, is_dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any, get_args, get_type_hints
 
 from analytic.errors import InputError
 from reports.data.records import SCHEMA, Report
-from validation.columns import record_of
+from validation.columns import described, record_of
 
 
 def read_report(path: Path | str) -> Report:
@@ -86,7 +86,7 @@ def schema() -> dict[str, Any]:
 
     made, kinds = msgspec.json.schema(Report), record_types()
     for name, shown in made["$defs"].items():
-        for key, meaning in meanings(kinds[name], units=True).items():
+        for key, meaning in meanings(kinds[name]).items():
             shown["properties"][key] = {**shown["properties"][key], "description": meaning}
     return made
 
@@ -100,9 +100,7 @@ def record_types(kind: Any = Report) -> dict[str, type]:
     return found
 
 
-def meanings(record: Any, *, units: bool = False) -> dict[str, str]:
-    """Return the meanings of the keys of a record, with `units` also their units."""
-    said = {each.name: each.metadata.get("column", ("", None, "")) for each in fields(record)}
-    return {
-        name: f"{meaning} [{unit}]".strip() if units and unit else meaning for name, (_, unit, meaning) in said.items()
-    }
+def meanings(record: type) -> dict[str, str]:
+    """Return the meanings of the keys of a record with their units."""
+    units = {each.key: f" [{each.unit}]" * (each.unit not in ("", "1")) for each in described(record).values()}
+    return {name: f"{each.meaning}{units[name]}".strip() for name, each in described(record).items()}

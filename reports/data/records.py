@@ -119,7 +119,7 @@ class MethodRow:
     error: Metrics | None = column(meaning="against the reference")
     noise: RunsError | None = column(meaning="of a method that draws random numbers: errors over runs", default=None)
     surface_error: Metrics | None = column(meaning="the same for the lit surface; `null` if there is none")
-    flip: Flip | None = column(meaning="HDR-FLIP of all light, or why there is none; `null` if not asked for")
+    flip: Flip | None = column("HDR-FLIP", meaning="of all light, or why there is none; `null` if not asked for")
     parameters: Mapping[str, int | float | bool | str] = column(meaning="of the configuration")
     refused: str | None = column(meaning="why there is no frame; `null` if there is one")
     left_out: bool = column(meaning="whether the time was the only reason for `refused`")

@@ -31,6 +31,7 @@ _COLUMNS = (
     Column("new", "new", digits=4),
     Column("change", "change", words=True),
 )
+Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
 _BUSY = 1.25  # with a larger ratio of the quartiles the machine was not quiet
 
 
@@ -96,26 +97,30 @@ def _methods(old: Scene, new: Scene) -> tuple[list[Finding], int]:
         findings.append(reason)
     compared = 0
     for label in [label for label in before if label in after]:
-        old_entry, new_entry = before[label], after[label]
-        if bool(old_entry.refused) != bool(new_entry.refused):
-            lost = new_entry.refused
-            words = f"refused: {lost}" if lost else "no longer refused"
-            # Leaving a method out for the time it takes is a decision of the user, not a fault.
-            decided = old_entry.left_out or new_entry.left_out
-            findings.append(Finding("note" if decided else "worse" if lost else "better", name, label, words))
-        elif old_entry.layer != new_entry.layer:
-            findings.append(Finding("note", name, label, "errors not compared: they are of different layers"))
-        elif reason is None:
-            noisy = bool(old_entry.noise and new_entry.noise)
-            both = [(_errors_of(each, noisy), _numbers(each.surface_error)) for each in (old_entry, new_entry)]
-            for layer, was, is_now in zip(("", "surface "), *both):
-                changes, count = _errors(was, is_now, prefix=layer)
-                findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
-                compared += count
-            changes, count = _flip(old_entry, new_entry)
-            findings += [Finding(v, name, label, what, a, b) for v, what, a, b in changes]
-            compared += count
+        changes, count = _entries(before[label], after[label], errors=reason is None)
+        findings += [Finding(found, name, label, what, was, now) for found, what, was, now in changes]
+        compared += count
     return findings, compared
+
+
+def _entries(old: MethodRow, new: MethodRow, *, errors: bool) -> tuple[list[Change], int]:
+    """Compare a configuration in a scene, and where `errors` can be compared these: return how many were."""
+    if bool(old.refused) != bool(new.refused):
+        words = f"refused: {new.refused}" if new.refused else "no longer refused"
+        # Leaving a method out for the time it takes is a decision of the user, not a fault.
+        decided = old.left_out or new.left_out
+        return [("note" if decided else "worse" if new.refused else "better", words, None, None)], 0
+    if old.layer != new.layer:
+        return [("note", "errors not compared: they are of different layers", None, None)], 0
+    if not errors:
+        return [], 0
+    noisy = bool(old.noise and new.noise)
+    parts = [
+        _errors(_errors_of(old, noisy), _errors_of(new, noisy), prefix=""),
+        _errors(_numbers(old.surface_error), _numbers(new.surface_error), prefix="surface "),
+        _flip(old, new),
+    ]
+    return [change for changes, _ in parts for change in changes], sum(count for _, count in parts)
 
 
 def _incomparable(old: Scene, new: Scene) -> Finding | None:
@@ -134,9 +139,6 @@ def _incomparable(old: Scene, new: Scene) -> Finding | None:
         )
         return Finding("worse", old.name, "", words, before, after)
     return None
-
-
-Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
 
 
 Numbers = Mapping[str, Any]  #: of `Metrics` by name, and `NAME_within`, half of the interval of a number

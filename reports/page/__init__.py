@@ -7,7 +7,6 @@ Read in this order:
 
 - `filters.py`: how numbers are written, sentences made of data, the tables
 - `chart.py`: speed against error, as SVG
-- `image_codec.py`: images as integers that compress well
-- `image_index.py`: what the script of the page reads
+- `images.py`: images as data that the script of the page reads
 - `render.py`: the page of all these
 """

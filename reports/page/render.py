@@ -2,7 +2,7 @@
 """The page of a report: report.json and its images as one self-contained HTML file.
 
 Styles, scripts and images are put into the file: it opens without a network, in any recent browser. The images go in as
-data (`reports.page.image_index`), decoded and drawn by the scripts in `templates/`.
+data (`reports.page.images`), decoded and drawn by the scripts in `templates/`.
 """
 
 import base64
@@ -15,7 +15,7 @@ from analytic.errors import InputError
 from reports.data.records import Method, Report, Scene
 from reports.page.chart import scene_chart, speed_error_chart
 from reports.page.filters import FILTERS, KINDS, MARKS, TABLES, kept_words, trust_words, viewer_words
-from reports.page.image_index import SceneImages, page_images
+from reports.page.images import SceneImages, page_images
 from reports.plotting.pictures import signed_colours, unsigned_colours
 
 if TYPE_CHECKING:

@@ -124,18 +124,25 @@ def preview(radiance: NDArray[np.float64], curve: ToneCurve) -> Picture:
         return tone_mapped(x * (1 + x / curve.white**2) / (1 + x), 1.0)
 
 
-def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Picture:
-    """Return the signed relative error of images, (height, width, 3), in false colours: blue too dark, red too bright.
-
-    The error of a pixel is its largest over the channels of (test - reference) / max(reference, 0.001 mean(reference)),
-    on a scale that is white below 1e-4 and logarithmic from there to 1 on either side, the same for every method.
-    """
+def relative_error(reference: NDArray[np.float64], test: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (test - reference) / max(reference, 0.001 mean(reference)), not a number where an image is not finite."""
     finite = np.isfinite(reference) & np.isfinite(test)
     mean = float(reference[finite].mean()) if finite.any() else 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
         relative = (test - reference) / np.maximum(reference, FLOOR * mean)
     # Equal values have no error, also where both are black and the mean is 0.
-    relative = np.where(finite & (test != reference), relative, 0)
+    return np.where(finite, np.where(test == reference, 0.0, relative), np.nan)
+
+
+def error_map(reference: NDArray[np.float64], test: NDArray[np.float64]) -> Picture:
+    """Return the signed relative error of images, (height, width, 3), in false colours: blue too dark, red too bright.
+
+    The error of a pixel is the largest `relative_error` over its channels, on a scale that is white below 1e-4 and
+    logarithmic from there to 1 on either side, the same for every method.
+    """
+    relative = relative_error(reference, test)
+    finite = ~np.isnan(relative)
+    relative = np.where(finite, relative, 0)
     worst = np.take_along_axis(relative, np.abs(relative).argmax(axis=-1)[..., None], axis=-1)[..., 0]
     decades = np.log10(ERROR_CEILING / ERROR_FLOOR)
     size = np.clip(np.log10(np.maximum(np.abs(worst), 1e-30) / ERROR_FLOOR) / decades, 0, 1)

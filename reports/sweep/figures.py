@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.plotting.figure import new_figure, plain_times, short
+from reports.plotting.figure import legend_below, new_figure, plain_times, short
 from reports.plotting.style import report_styles
 from reports.sweep.claims import TARGETS
 from reports.sweep.samples import Numbers, Sample
@@ -78,9 +78,9 @@ def medians(said: Summary) -> "Figure | None":
     panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
     plain_times(panel)
     panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-    keys = {short(each.label, _LABEL): styles[each.label] | {"linestyle": "none"} for each in shown}
-    handles = [panel.plot([], [], label=label, **style)[0] for label, style in keys.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    legend_below(
+        figure, panel, {each.label: styles[each.label] for each in shown}, columns=3, fontsize=8, frameon=False
+    )
     return figure
 
 

@@ -89,8 +89,8 @@ def correlations_table(said: Summary) -> Table:
         Column("r", "correlation", sign=True, spread="interval", places=2),
     )
     rows = [
-        {"label": label, "property": property_words(each.property), "r": Measured(each.r, each.low, each.high)}
-        for label, chosen in said.strongest.items()
+        vars(each) | {"property": property_words(each.property), "r": Measured(each.r, each.low, each.high)}
+        for chosen in said.strongest.values()
         for each in chosen
     ]
     return table("Correlations with the error", columns, rows)
@@ -99,28 +99,17 @@ def correlations_table(said: Summary) -> Table:
 def refusals_table(said: Summary) -> Table:
     """Return why cells have no numbers, each reason once."""
     columns = (
-        *numbers(cells="cells", scenes="scenes"),
-        *words(reason="reason", how={"long": True}),
-        *words(status="outcome", methods="methods", how={"minor": True}),
+        *words(status="outcome", how={"minor": True}),
+        *words("reason", how={"long": True}),
+        *words("methods", how={"minor": True}),
+        *numbers("scenes", "cells"),
     )
     rows = []
     for each in said.reasons:
         shown = ", ".join(each.labels[:3]) + (f" and {len(each.labels) - 3} more" if each.labels[3:] else "")
-        rows.append(
-            {
-                "reason": each.reason,
-                "status": each.status,
-                "cells": each.cells,
-                "scenes": each.scenes,
-                "methods": shown,
-            }
-        )
-    return table(
-        "Refused and not done, by reason",
-        columns,
-        rows,
-        explanation="In reasons N stands for a number, SCENE for a scene.",
-    ).only("status", "reason", "methods", "scenes", "cells")
+        rows.append(vars(each) | {"methods": shown})
+    explanation = "In reasons N stands for a number, SCENE for a scene."
+    return table("Refused and not done, by reason", columns, rows, explanation=explanation)
 
 
 def checks_table(said: Summary) -> Table:

@@ -4,35 +4,23 @@
 from collections.abc import Iterable, Sequence
 
 from reports.data.records import Scene
-from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, numbers, table, words
+from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, fields_of, numbers, table, words
 from validation.statistics.records import Agreement, Statistics
 
 _PERCENT = {"percent": True, "sign": True}
-#: Columns of what estimators say of the reference, with their meaning.
+#: Columns of what estimators say of the reference.
 COLUMNS = (
     *words(name="layer"),
     *numbers(agrees="agree"),
-    *numbers("margin", how={"percent": True, "meaning": "agreement: the whole interval lies inside it, either way"}),
-    *numbers(
-        relative_bias="bias",
-        how={**_PERCENT, "meaning": "mean of the estimator less the reference, over the reference"},
-    ),
-    *numbers(
-        interval="95 % interval", how={**_PERCENT, "places": 3, "meaning": "where 19 of 20 such runs find the bias"}
-    ),
-    *numbers(
-        detectable_bias="detectable",
-        how={"percent": True, "digits": 2, "meaning": "the least bias that is found in nine runs of ten"},
-    ),
-    *numbers(
-        epsilon="shadow-ray epsilon", how={"meaning": "by what fraction Mitsuba's shadow rays end before the light"}
-    ),
-    *numbers(uncorrected_bias="uncorrected", how={**_PERCENT, "meaning": "the bias without the shadow-ray epsilon"}),
-    *numbers(z_mean="z: mean", how={"meaning": "errors of pixels in units of their noise: 0 if there is no bias"}),
-    *numbers(z_std="z: st. deviation", how={"meaning": "1 if the noise is as large as was estimated"}),
-    *numbers("rejected", how={"meaning": "pixels that differ by more than their noise explains"}),
-    *numbers(expected_rejections="expected", how={"digits": 2, "meaning": "how many would be rejected by chance"}),
-    *numbers("masked", how={"meaning": "pixels left out: their ray passes close to a light"}),
+    *fields_of(Statistics, "margin", percent=True),
+    *fields_of(Statistics, "relative_bias", **_PERCENT),
+    *fields_of(Statistics, "relative_bias_ci", places=3, **_PERCENT),
+    *fields_of(Statistics, "detectable_bias", percent=True, digits=2),
+    *fields_of(Agreement, "epsilon"),
+    *fields_of(Agreement, "uncorrected_bias", **_PERCENT),
+    *fields_of(Statistics, "z_mean", "z_std", "rejected"),
+    *fields_of(Statistics, "expected_rejections", digits=2),
+    *fields_of(Agreement, "masked"),
     *words("effort"),
 )
 
@@ -129,7 +117,7 @@ def _values(name: str, comparison: Agreement) -> dict[str, Value]:
         **vars(comparison.statistics),
         **vars(comparison),
         "name": name,
-        "interval": Interval.of(comparison.statistics.relative_bias_ci),
+        "relative_bias_ci": Interval.of(comparison.statistics.relative_bias_ci),
         "effort": "{width} x {height} pixels, {batches} x {samples} spp".format(**vars(comparison)),
         "agrees": Verdict(verdict(comparison)),
     }

@@ -2,11 +2,10 @@
 """Costs and errors of methods: a table of studies, the page, the documentation and papers."""
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import fields
 from typing import TypeVar
 
 from realtime.methods.shader.source import is_shader
-from reports.data.reader import meanings
 from reports.data.records import MethodRow, Scene
 from reports.tables.table import (
     Column,
@@ -15,46 +14,34 @@ from reports.tables.table import (
     Table,
     Value,
     digits_of,
+    fields_of,
     measured,
     number,
     numbers,
     table,
     words,
 )
-from validation.columns import columns_of
 from validation.metrics.errors import Metrics
 from validation.study.row import Row as CellRow
 from validation.timing import FrameTimes, Timing
 
 #: Times of a frame, by their names in report.json.
-TIMES = tuple(meanings(FrameTimes))
+TIMES = tuple(each.name for each in fields(FrameTimes))
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 
-_OF_ROWS = meanings(MethodRow)
-_MEANINGS = {column.key: column.meaning for column in columns_of(Metrics)} | meanings(FrameTimes)
-_MEANINGS |= {key: _OF_ROWS[key] for key in ("device", "memory", "flip")}
-_MEANINGS["nonfinite"] = "pixels that are no number, which errors leave out"
-
-_MS, _RATE, _FRACTION, _MINOR = {"unit": "ms"}, {"whole": True}, {"digits": 2, "fraction": True}, {"minor": True}
 COLUMNS = {
-    column.key: replace(column, meaning=_MEANINGS.get(column.key, ""))
+    column.key: column
     for column in (
         *words(label="method"),
-        *numbers("frame", how={**_MS, "spread": "quartiles"}),
-        *words(device="device"),
-        *numbers(frame_rate="frames/s", how=_RATE),
-        *numbers(airlight_rate="airlight/s", how=_RATE | _MINOR),
-        *numbers("airlight", surface="rays + surface", how=_MS | _MINOR),
-        *numbers(light_moved="light moved", objects_moved="objects moved", how=_MS | _MINOR),
-        *numbers(
-            light_moved_camera_cached="light moved, camera rays cached",
-            colours_changed="colours changed",
-            how=_MS | _MINOR,
-        ),
-        *numbers(memory="memory [MiB]", how=_RATE | _MINOR),
-        *numbers("p99", "max", relative_rmse="rel. RMSE", relative_bias="rel. bias", p50="median error", how=_FRACTION),
-        *numbers(flip="HDR-FLIP"),
-        *numbers(nonfinite="not finite", how={"alarm": True}),
+        *fields_of(FrameTimes, "frame", spread="quartiles"),
+        *fields_of(MethodRow, "device"),
+        *numbers(frame_rate="frames/s", how={"whole": True}),
+        *numbers(airlight_rate="airlight/s", how={"whole": True, "minor": True}),
+        *fields_of(FrameTimes, *TIMES[1:], minor=True),
+        *fields_of(MethodRow, "memory", whole=True, minor=True),
+        *fields_of(Metrics, *ERRORS[:-1], digits=2, fraction=True),
+        *fields_of(MethodRow, "flip"),
+        *fields_of(Metrics, "nonfinite", alarm=True),
     )
 }
 _Entry = TypeVar("_Entry", MethodRow, CellRow)

@@ -4,11 +4,11 @@
 Rows are those that stand under `papers` of report.json.
 """
 
+import itertools
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 
-from reports.tables.table import Interval, Row, Table, Value, numbers, table, words
+from reports.tables.table import Interval, Table, Value, numbers, table, words
 from validation.papers.claims import VERDICTS, Claim, papers
 
 _COLUMNS = (
@@ -22,41 +22,19 @@ _COLUMNS = (
 )
 
 
-def paper_tables(rows: Sequence[Claim]) -> list[Table]:
-    """Return for each paper a table of verdicts and one of numbers without a verdict."""
-    return [*verdict_tables(rows), *number_tables(rows)]
-
-
-def verdict_tables(rows: Sequence[Claim]) -> list[Table]:
-    """Return a table of verdicts for each paper."""
-    judged = [row for row in rows if row.verdict is not None]
-    return [
-        replace(_table(paper, several), explanation=f"{count_words(several)}.")
-        for paper, several in _by_paper(judged).items()
-    ]
-
-
-def number_tables(rows: Sequence[Claim]) -> list[Table]:
-    """Return a table of the numbers without a verdict for each paper."""
-    plain = [row for row in rows if row.verdict is None]
-    return [
-        _table(f"{paper}: numbers beside ours", several).only(
-            "item", "words", "published", "measured", "interval", "unit", "why"
-        )
-        for paper, several in _by_paper(plain).items()
-    ]
-
-
-def _by_paper(rows: Sequence[Claim]) -> dict[str, list[Claim]]:
-    named = papers()
-    found: dict[str, list[Claim]] = {}
-    for row in rows:
-        found.setdefault(named.get(row.paper, row.paper), []).append(row)
-    return found
-
-
-def _table(title: str, rows: Sequence[Claim]) -> Table:
-    return table(title, _COLUMNS, [Row(_cells(row)) for row in rows])
+def paper_tables(rows: Sequence[Claim], *, plain: bool = True) -> list[Table]:
+    """Return for each paper a table of verdicts, then with `plain` one of its numbers without a verdict."""
+    made = []
+    names = dict.fromkeys(row.paper for row in rows)
+    for judged, paper in itertools.product((True, False) if plain else (True,), names):
+        several = [row for row in rows if row.paper == paper and (row.verdict is not None) == judged]
+        name = papers().get(paper, paper)
+        if several and judged:
+            made.append(table(name, _COLUMNS, map(_cells, several), explanation=f"{count_words(several)}."))
+        elif several:
+            shown = table(f"{name}: numbers beside ours", _COLUMNS, map(_cells, several))
+            made.append(shown.only("item", "words", "published", "measured", "interval", "unit", "why"))
+    return made
 
 
 def _cells(row: Claim) -> dict[str, Value]:

@@ -113,7 +113,7 @@ class Said(Result):
     """A result that is worked out as a whole."""
 
     name: str
-    data: Any = None  #: as JSON has them
+    data: Any = None  #: as JSON has them; by default those of the record
     claims: Sequence[str] = ()
     tables: Sequence[Table] = ()
     lines: Sequence[str] = ()
@@ -133,7 +133,9 @@ class Said(Result):
 
     def to_dict(self) -> Any:
         """Return the data."""
-        return self.data
+        from validation.columns import plain
+
+        return plain(self.of if self.data is None else self.data)
 
 
 # Pieces of HTML for notebooks, without scripts.

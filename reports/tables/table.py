@@ -14,6 +14,9 @@ if TYPE_CHECKING:  # making its classes would take a tenth of the time of `airli
     from validation.timing import Timing
 
 
+_UNITS = ("ms", "MiB")  # that stand in a heading
+
+
 @dataclass(frozen=True)
 class Measured:
     """A median with its quartiles."""
@@ -144,14 +147,31 @@ def table_of(
     how: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> Table:
     """Return the table of some records, or of mappings; `how` are other fields of a column by its key."""
-    from validation.columns import columns_of
-
-    columns = [
-        Column(each.key, each.heading, words=each.kind == "string", **how.get(each.key, {}))
-        for each in columns_of(record)
-    ]
+    columns = [replace(each, **how.get(each.key, {})) for each in fields_of(record)]
     values = [row if isinstance(row, Mapping) else vars(row) for row in rows]
     return table(title, columns, values, explanation=explanation)
+
+
+def fields_of(record: type, *keys: str, **how: Any) -> tuple[Column, ...]:
+    """Return columns of fields of a record, by default of all texts and numbers; `how` are other fields of `Column`.
+
+    Their headings, units and meanings stand at the fields.
+    """
+    from validation.columns import described
+
+    known = described(record)
+    shown = [known[key] for key in keys] or [each for each in known.values() if each.kind]
+    return tuple(
+        Column(
+            each.key,
+            each.heading,
+            each.unit if each.unit in _UNITS else "",
+            words=each.kind == "string",
+            meaning=each.meaning,
+            **how,
+        )
+        for each in shown
+    )
 
 
 def words(*keys: str, how: Mapping[str, Any] | None = None, **headings: str) -> tuple[Column, ...]:

@@ -17,7 +17,7 @@ target before `LEAST_BATCHES`: the standard error of a standard error is 1/sqrt(
 
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -85,7 +85,7 @@ def layered_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: 
 class MonteCarloReference:
     """A reference by random samples, and how it came about."""
 
-    image: Image  #: layers with their standard errors
+    image: Image = field(repr=False)  #: layers with their standard errors
     errors: dict[str, float]
     reached: bool | None  #: whether the target error was reached; None if none was set
     masked: int  #: pixels beside a light, whose airlight is left out of `errors`

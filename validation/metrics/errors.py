@@ -41,7 +41,7 @@ class Metrics:
     p50: float | None = column("median error", "1", f"half of the values err by less: {_RELATIVE}")
     p99: float | None = column("p99", "1", f"99 of 100 values err by less: {_RELATIVE}")
     max: float | None = column("max", "1", f"all values err by at most: {_RELATIVE}")
-    nonfinite: int = column("not finite", "pixels", "with NaN or infinity in either image; left out of every average")
+    nonfinite: int = column("not finite", "pixels", "with a value that is not finite; averages leave them out")
     negative: int = column("negative", "pixels", "with a negative value in the test image; they stay in the averages")
 
 

@@ -18,32 +18,32 @@ class Statistics:
     sqrt((K - 1)/(K - 3)). Numbers "expected" are those of images that agree.
     """
 
-    masked: int  #: pixels that the mask leaves out
+    masked: int = column(unit="pixels", meaning="that the mask leaves out")
     tested: int  #: values with a z
     zero_reference: int  #: values where the reference is zero
     zero_reference_error: Number  #: the largest |test| among them over the mean of the reference
     zero_variance: int  #: values without variance
     zero_variance_error: Number  #: the largest |test - ref| among them over the mean of the reference
-    z_mean: Number
-    z_std: Number
-    rejected: int  #: pixels with a value rejected at Sidak's level
-    expected_rejections: float
+    z_mean: Number = column("z: mean", meaning="errors of pixels in units of their noise: 0 if there is no bias")
+    z_std: Number = column("z: st. deviation", meaning="1 if the noise is as large as was estimated")
+    rejected: int = column(unit="pixels", meaning="with a value rejected at Sidak's level: noise does not explain it")
+    expected_rejections: float = column("expected", "pixels", "that would be rejected by chance")
     exceeding: int  #: values whose p-value is below `validation.statistics.comparison.LEVEL`
     expected_exceeding: float
     exceeding_p: Number  #: p-value of `exceeding`, both tails
     blocks: int  #: of 8 x 8 pixels, one channel each
     rejected_blocks: int  #: at Sidak's level for their number
     uniformity_p: Number  #: p-value of the test that the p-values are uniform
-    relative_bias: Number  #: sum(test) / sum(ref) - 1
-    relative_bias_ci: Ends  #: its 95 % interval from the standard errors
+    relative_bias: Number = column("bias", meaning="sum of the test image over that of the reference, less 1")
+    relative_bias_ci: Ends = column("95 % interval", meaning="where 19 of 20 such runs find the bias")
     relative_bias_ci_batches: Ends | None  #: that from the batch means
     relative_bias_se: Number  #: from the standard errors of the pixels
     relative_bias_freedom: Number  #: degrees of freedom of that; None for the normal law
     relative_bias_p: Number  #: two-sided
     reference_variance_fraction: Number  #: of the reference in the variance of `relative_bias`; the rest is the test's
     largest_fraction: Number  #: of one pixel in that variance; above 1 % the interval is doubtful
-    detectable_bias: Number  #: smallest that is found with 90 % power at the 5 % level, by the wider interval
-    margin: Number
+    detectable_bias: Number = column("detectable", meaning="the least bias that is found in nine runs of ten")
+    margin: Number = column(meaning="agreement: the whole interval lies inside it, either way")
     equivalent: bool | None  #: whether all intervals lie within the margin
 
 
@@ -57,10 +57,12 @@ class Agreement:
     height: int = column(unit="pixels")
     batches: int = column(meaning="that were traced or taken from the cache")
     samples: int = column(meaning="per pixel in a batch")
-    epsilon: float = column(meaning="of the shadow rays that it was corrected for; 0 for single-scatter")
+    epsilon: float = column(
+        "shadow-ray epsilon", meaning="by what fraction shadow rays end before the light; 0 for single-scatter"
+    )
     masked: int = column(unit="pixels", meaning="left out because a light is close to their ray")
     statistics: Statistics = column(meaning="the check confirms the reference if it is `equivalent`")
-    uncorrected_bias: Number = column(meaning="relative bias before the correction")
+    uncorrected_bias: Number = column("uncorrected", meaning="relative bias without the shadow-ray epsilon")
     finished: bool = column(meaning="whether its intervals became narrow enough; else it may be undecided")
 
 

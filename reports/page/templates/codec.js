@@ -1,4 +1,4 @@
-// Decodes the images that reports/page/image_codec.py packed: zlib, byte planes, zigzag, prediction. Nothing here draws.
+// Decodes the images that reports/page/images.py packed: zlib, byte planes, zigzag, prediction. Nothing here draws.
 "use strict";
 
 const NAN_CODE = -32768, INFINITE_CODE = 32767;

@@ -57,7 +57,7 @@ def test_same_samples_and_seed_are_the_same_bytes(traced, tmp_path, monkeypatch,
     """From an empty cache, from a full one, and from one that holds more."""
     first = summary(tmp_path / "a.exr", capfd, "--samples", "64", "--seed", "3")
     second = summary(tmp_path / "b.exr", capfd, "--samples", "64", "--seed", "3")
-    assert (first["cached"], second["cached"]) == (0, 32)
+    assert (first["how"]["cached"], second["how"]["cached"]) == (0, 32)
     attributes = read_exr(tmp_path / "a.exr").attributes
     expected = {"estimator": "volpath", "spp": 64, "batch_spp": 2, "batches": 32, "seed": 3, "seeds": "3-34"}
     assert {name: attributes[f"airlight:{name}"] for name in expected} == expected
@@ -73,11 +73,12 @@ def test_same_samples_and_seed_are_the_same_bytes(traced, tmp_path, monkeypatch,
 def test_target_error_is_reached_and_no_more(traced, tmp_path, capfd):
     # A channel has 48 pixels: its mean is known to 1/sqrt(48 batches), to 2 % from 52 batches on.
     reached = summary(tmp_path / "a.exr", capfd, "--error", "0.02")
-    assert reached["reached"] is True
-    assert reached["pooled_error"] <= 0.02
-    assert reached["batches"] == 32 or reached["pooled_error"] > 0.02 * (1 - 8 / reached["batches"]) ** 0.5 * 0.9
+    assert reached["how"]["reached"] is True
+    error = reached["how"]["errors"]["pooled"]
+    assert error <= 0.02
+    assert reached["batches"] == 32 or error > 0.02 * (1 - 8 / reached["batches"]) ** 0.5 * 0.9
     again = summary(tmp_path / "b.exr", capfd, "--error", "0.02")
-    assert again["cached"] == reached["batches"]
+    assert again["how"]["cached"] == reached["batches"]
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 
@@ -102,7 +103,7 @@ def test_a_stopped_run_goes_on_and_a_damaged_block_is_traced_again(traced, tmp_p
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
     repaired = summary(tmp_path / "b.exr", capfd, "--samples", "64")
-    assert (repaired["cached"], repaired["damaged"]) == (24, 1)
+    assert (repaired["how"]["cached"], repaired["how"]["damaged"]) == (24, 1)
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
 
 
@@ -146,5 +147,5 @@ def test_a_run_that_is_killed_loses_nothing(variant, tmp_path, capfd, own_cache)
     assert len(names) >= 3
     assert all(load_arrays(name) is not None for name in names)
     resumed = summary(tmp_path / "b.exr", capfd, "--samples", "2048")
-    assert resumed["cached"] >= 3
+    assert resumed["how"]["cached"] >= 3
     assert resumed["damaged"] == 0

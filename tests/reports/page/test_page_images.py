@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from reports.page.image_codec import (
+from reports.page.images import (
     DIFFERENCE_BITS,
     INFINITE,
     NAN,
@@ -22,10 +22,10 @@ from reports.page.image_codec import (
     S,
     difference_codes,
     pack_planes,
+    page_images,
     reference_codes,
     reference_values,
 )
-from reports.page.image_index import page_images
 from tests.helpers.page import small_report, write_files
 
 
