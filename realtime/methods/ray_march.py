@@ -110,10 +110,10 @@ class RayMarch(Method):
         """Return the airlight of every ray by marching [W/(m^2 sr)]."""
         airlight = view.lit_by(light, kernel if self.uses_kernel else None)
 
-        def lit(point):
+        def lit(x):
             if self.shadow == "none" or not view.features.shadows:
                 return True
-            return lit_in_map(state, light, point) if self.shadow == "map" else view.visible(point, light)
+            return lit_in_map(state, light, view.at(x)) if self.shadow == "map" else view.visible(view.at(x), light)
 
         if self.sum == "transitions":
             integral = _lit_runs(airlight, view.distance, steps=self.steps, spacing=self.spacing, lit=lit)
@@ -145,7 +145,7 @@ def _lit_runs(airlight: LitRays, distance, *, steps: int, spacing: str, lit) -> 
     def step(index, was_lit, opened, intervals):
         border = dr.select(index == 0, x0, dr.maximum(cells.place(dr.fma(Float(index), cells.width, cells.begin)), x0))
         x = cells.place(dr.fma(Float(index) + 0.5, cells.width, cells.begin))
-        now = meets & lit(airlight.rays.at(x))
+        now = meets & lit(x)
         closes = was_lit & ~now
         intervals = add_waiting(intervals, airlight.airlight, closes | ((index & _DUE) == _DUE))
         intervals = close_interval(intervals, border, closes, begin=opened)

@@ -46,57 +46,6 @@ def light_samples(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
     return tuple(point for number, of_light in enumerate(placed) for point in _points_of(of_light, number, types))
 
 
-@dataclass(frozen=True)
-class LightFrame:
-    """A light sample, or one of several in each lane, and the orthonormal frame of its normal."""
-
-    position: Any  #: [m]
-    across: Any
-    up: Any
-    normal: Any
-    lift: Any  #: how far before the shape rays start [m]
-
-    def local(self, vector: Any) -> tuple[Any, Any, Any]:
-        """Return the coordinates of a vector in the frame."""
-        return dr.dot(vector, self.across), dr.dot(vector, self.up), dr.dot(vector, self.normal)
-
-    def shadow_ray(self, point: Any) -> Any:
-        """Return the Mitsuba ray that is blocked where a light sample does not reach a point [m]."""
-        start = mi.Point3f(self.position + self.normal * self.lift)
-        direction = mi.Vector3f(point) - mi.Vector3f(start)
-        length = dr.norm(direction)
-        # As `realtime.scene.lights.Light.shadow_ray`: a surface at the point itself must not block the light.
-        return mi.Ray3f(start, direction / length, length * (1 - 2e-6), 0.0, [])
-
-
-def light_frames(points: Sequence[Light]) -> tuple[LightFrame, Array, Array]:
-    """Return light samples in one table, a lane each, so that one loop goes over them, whatever their number.
-
-    Their positions [m] and normals follow, a row each: all are brought to the host together, which waits for the device
-    once.
-    """
-    each = [(point.position, own.exact_normal, own.lift) for point in points if (own := point.facing)]
-    numbers = host_numbers(*(value for of_point in each for value in of_point))
-    position, normal, lift = (np.stack(numbers[first::3]) for first in range(3))
-    helper = np.where(np.abs(normal[:, :1]) < 0.5, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    across = np.cross(helper, normal)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    types = types_of(type(points[0].position.x))
-
-    def lanes(rows: Array):
-        return types.vector(*(aligned_array(types.scalar, column) for column in rows.T))
-
-    up = lanes(np.cross(normal, across))
-    frames = LightFrame(lanes(position), lanes(across), up, lanes(normal), aligned_array(types.scalar, lift[:, 0]))
-    return frames, position, normal
-
-
-def frame_at(frames: LightFrame | None, number: Any) -> LightFrame:
-    """Return light samples of a table by their numbers."""
-    assert frames is not None
-    return dr.gather(LightFrame, frames, number)
-
-
 def _points_of(placed: PlacedPoints, source: int, types: ArrayTypes) -> list[Light]:
     # Arrays that all points share are made once: a frame after a light moved makes all arrays again.
     intensity = types.color(*aligned_numbers(types.scalar, placed.intensity))

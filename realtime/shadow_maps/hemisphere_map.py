@@ -18,6 +18,7 @@ texel.
 The maps of N points follow one another, and all are cast at once, so that the number of kernels does not grow with N.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,9 @@ import drjit as dr
 import mitsuba as mi
 
 from realtime.numerics.array_types import bytes_of
-from realtime.scene.light_samples import LightFrame
+from realtime.scene.light_samples import LightTable
+from realtime.scene.lights import Light
+from realtime.scene.media.medium import Rays
 from realtime.shadow_maps.shadow_map import check_size, tiled_corners
 
 
@@ -37,32 +40,65 @@ class HemisphereMaps:
     inverse: Any  #: N (size + 1)^2 values 1/s, 0 where there is nothing [1/m]
     eased: Any  #: the same, less what a plane changes in half a texel [1/m]; None where no surface is asked for
 
-    def lit(self, number: Any, place: tuple[Any, Any, Any], active: Any = True) -> Any:
-        """Return whether a light sample reaches points in the air, given by local coordinates [m]."""
-        own, corner = self._corner(number, place)
-        return own >= dr.gather(type(own), self.inverse, corner, active)
+    def of(self, number: Any, light: Light) -> "HemisphereMap":
+        """Return the maps of light samples of some numbers."""
+        return HemisphereMap(self, light, number * (self.size + 1) ** 2, *_across(light))
 
-    def lit_surface(self, number: Any, place: tuple[Any, Any, Any]) -> Any:
-        """Return whether a light sample reaches points on surfaces, given by local coordinates [m]."""
-        assert self.eased is not None
-        own, corner = self._corner(number, place)
-        return own >= dr.gather(type(own), self.eased, corner)
 
-    def beyond(self, number: Any, place: tuple[Any, Any, Any], active: Any = True) -> Any:
+@dataclass(frozen=True)
+class HemisphereMap:
+    """The map of a light sample, or of one of several in each lane."""
+
+    maps: HemisphereMaps
+    light: Light
+    first: Any  #: its first entry
+    across: Any
+    up: Any
+
+    def lit(self, point: Any) -> Any:
+        """Return whether the light sample reaches points in the air [m]."""
+        return self._reaches(self._local(point - self.light.position))
+
+    def lit_along(self, rays: Rays) -> Callable[[Any], Any]:
+        """Return a test of whether the light sample reaches rays at distances [m]: a sum for each coordinate."""
+        start, way = self._local(rays.origin - self.light.position), self._local(rays.direction)
+        return lambda x: self._reaches([dr.fma(slope, x, first) for slope, first in zip(way, start, strict=True)])
+
+    def lit_surface(self, point: Any) -> Any:
+        """Return whether the light sample reaches points on surfaces [m]."""
+        own, corner = self._corner(self._local(point - self.light.position))
+        return own >= dr.gather(type(own), self.maps.eased, corner)
+
+    def beyond(self, point: Any, active: Any = True) -> Any:
         """Return how far points are behind what the map holds, over the distance of that from the light [1]."""
-        own, corner = self._corner(number, place)
-        return dr.gather(type(own), self.inverse, corner, active) / own - 1
+        own, corner = self._corner(self._local(point - self.light.position))
+        return dr.gather(type(own), self.maps.inverse, corner, active) / own - 1
 
-    def _corner(self, number: Any, place: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-        """Return 1/s of a place, and the entry of the nearest corner."""
-        a, b, c = place
+    def _local(self, vector: Any) -> list[Any]:
+        return [dr.dot(vector, axis) for axis in (self.across, self.up, self.light.normal)]
+
+    def _reaches(self, place: Any) -> Any:
+        own, corner = self._corner(place)
+        return own >= dr.gather(type(own), self.maps.inverse, corner)
+
+    def _corner(self, place: Any) -> tuple[Any, Any]:
+        """Return 1/s of a place, by its coordinates, and the entry of the nearest corner."""
+        (a, b, c), size = place, self.maps.size
         inverse = dr.rcp(dr.abs(a) + dr.abs(b) + dr.maximum(c, 0))
-        scale, middle = 0.5 * self.size * inverse, 0.5 * (self.size + 1)
+        scale, middle = 0.5 * size * inverse, 0.5 * (size + 1)
         # In whole numbers, whatever the place is: a light itself has no direction.
         column, row = (
-            dr.minimum(mi.UInt32(dr.maximum(dr.fma(along, scale, middle), 0)), self.size) for along in (a + b, a - b)
+            dr.minimum(mi.UInt32(dr.maximum(dr.fma(along, scale, middle), 0)), size) for along in (a + b, a - b)
         )
-        return inverse, (number * (self.size + 1) + row) * (self.size + 1) + column
+        return inverse, self.first + row * (size + 1) + column
+
+
+def _across(light: Light) -> tuple[Any, Any]:
+    """Return two unit vectors at right angles to the normal of a light sample."""
+    normal = light.normal
+    helper = dr.select(dr.abs(normal.x) < 0.5, type(normal)(1, 0, 0), type(normal)(0, 1, 0))
+    across = dr.normalize(dr.cross(helper, normal))
+    return across, dr.cross(normal, across)
 
 
 def maps_memory(Float: Any, points: int, size: int) -> int:
@@ -71,26 +107,28 @@ def maps_memory(Float: Any, points: int, size: int) -> int:
 
 
 def cast_hemisphere_maps(
-    scene: Any, frames: LightFrame, points: int, size: int, *, for_surfaces: bool = True
+    scene: Any, table: LightTable, like: Light, size: int, *, for_surfaces: bool = True
 ) -> HemisphereMaps:
-    """Cast the maps of all points of a light.
+    """Cast the maps of light samples.
 
-    `scene`: the Mitsuba scene that holds the occluders; `frames`: the light samples, one a lane; `points`: how many
-    there are; `size`: texels on a side of each map, a power of two; `for_surfaces`: whether points on surfaces will be
-    asked for, not only those in the air. Raises InputError if `size` is not a power of two from 4 to 8192.
+    `scene`: the Mitsuba scene that holds the occluders; `table`, `like`: the light samples, and one of them; `size`:
+    texels on a side of each map, a power of two; `for_surfaces`: whether points on surfaces will be asked for, not only
+    those in the air. Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
-    Float, side = type(frames.lift), size + 1
+    Float, side, points = type(like.position.x), size + 1, table.count
     number, row, column = tiled_corners(points, side)
     there = (row < side) & (column < side)
     u, v = (dr.fma(Float(corner), 2.0 / size, -1.0) for corner in (column, row))
     a, b = 0.5 * (u + v), 0.5 * (u - v)
     c = dr.maximum(1 - dr.abs(a) - dr.abs(b), 0)
-    frame = dr.gather(LightFrame, frames, number)
-    aim = frame.across * a + frame.up * b + frame.normal * c
+    light = table.light(number, like)
+    assert light.facing is not None
+    across, up = _across(light)
+    aim = across * a + up * b + light.normal * c
     length = dr.norm(aim)
     direction = aim / length
-    start = frame.position + frame.normal * frame.lift
+    start = light.position + light.normal * light.facing.lift
     hit = scene.ray_intersect_preliminary(
         mi.Ray3f(mi.Point3f(start), mi.Vector3f(direction)), coherent=True, active=there
     )

@@ -31,7 +31,6 @@ def test_a_plane_never_shadows_itself(variant):
     state = source_state(scene.geometry, list(scene.lights), 64, with_maps=True)
     points = np.random.default_rng(4).uniform([-5, -5, 0], [5, 5, 0], (50000, 3))
     place = mi.Vector3f(*(mi.Float(column) for column in points.T))
-    frame = dr.gather(type(state.frames), state.frames, mi.UInt32(1))
-    local = frame.local(place - frame.position)
-    lit = np.array(state.maps.lit_surface(mi.UInt32(1), local))[np.array(local[2]) > 0.1]
-    assert np.all(lit)
+    light = state.samples.light(mi.UInt32(1), scene.lights[0])
+    before = np.array(dr.dot(place - light.position, light.normal)) > 0.1
+    assert np.all(np.array(state.maps.of(mi.UInt32(1), light).lit_surface(place))[before])

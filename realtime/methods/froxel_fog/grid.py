@@ -38,7 +38,6 @@ Hillaire 2015, *Physically-based and unified volumetric rendering in Frostbite* 
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,6 +48,7 @@ from realtime.methods.interface.method import View
 from realtime.numerics.array_types import Metres, PerRay, four_numbers
 from realtime.numerics.functions import between_entries
 from realtime.scene.camera import Camera, row_and_column
+from realtime.scene.light_samples import LightTable
 from realtime.scene.media.medium import Medium, Rays
 
 _RATIO = 8  # far/near
@@ -95,10 +95,10 @@ class Grid:
         return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
 
 
-def view_grid(view: View, samples: Sequence[Any], *, size: tuple[int, int, int], far: float) -> Grid:
+def view_grid(view: View, samples: LightTable | None, *, size: tuple[int, int, int], far: float) -> Grid:
     """Return the grid of a view: froxels across, down and in depth, up to a depth [m]; 0: chosen for the frame.
 
-    `samples`: the places of the samples of area lights [m], a lane each.
+    `samples`: those of area lights.
     """
     return Grid(*size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view, samples))
 
@@ -111,7 +111,7 @@ def column_rays(view: View, grid: Grid) -> Rays:
     return rays
 
 
-def _frame_depth(view: View, samples: Sequence[Any]) -> Metres:
+def _frame_depth(view: View, samples: LightTable | None) -> Metres:
     """Return the depth of the farthest surface, or where rays meet none, where too little light comes from to matter.
 
     Grids, and media in vacuum, end by themselves.
@@ -125,10 +125,11 @@ def _frame_depth(view: View, samples: Sequence[Any]) -> Metres:
         return dr.maximum(dr.select(dr.all(met), dr.minimum(surfaces, last), last), 1e-3)
     beyond = Float(0)
     for light in view.lights:
-        if light.source is None:
+        if light.facing is None:
             beyond = dr.maximum(beyond, _reach(view, light.position, medium))
-    for positions in samples:
-        beyond = dr.maximum(beyond, dr.max(_reach(view, positions, medium)))
+    if samples is not None:
+        every = samples.light(dr.arange(mi.UInt32, samples.count), view.lights[-1])
+        beyond = dr.maximum(beyond, dr.max(_reach(view, every.position, medium)))
     return dr.maximum(dr.select(dr.all(met), surfaces, dr.maximum(surfaces, beyond)), 1e-3)
 
 

@@ -36,27 +36,15 @@ from realtime.methods.interface.method import View
 from realtime.numerics.array_types import PerRay
 from realtime.numerics.functions import summed
 from realtime.rays import profile
-from realtime.scene.light_samples import LightFrame, frame_at
+from realtime.scene.light_samples import LightTable
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Rays
-from realtime.shadow_maps.hemisphere_map import HemisphereMaps
 
-#: (point, light, its number among all lights) -> whether it is lit.
-Visibility = Callable[[Any, Light, int], Any]
+#: (point, light, its number among lights without extent, or among light samples) -> whether it is lit.
+Visibility = Callable[[Any, Light, Any], Any]
 
 _GROWTH = 1.2207440846057596  # g^4 = g + 1
 _STEPS = tuple(round(2**32 / _GROWTH**power) % 2**32 for power in (1, 2, 3))
-_UNROLLED = 4  # lights in one kernel where media have bounds: no loop can write down how a light sees them
-
-
-@dataclass(frozen=True)
-class LightSampleTable:
-    """The points of one area light."""
-
-    source: int  #: the number of the light
-    count: int  #: how many points it has
-    frames: LightFrame  #: one a lane
-    maps: HemisphereMaps | None  #: of all points; None: rays are cast
 
 
 @dataclass(frozen=True)
@@ -86,28 +74,27 @@ def scattered_light(
     rays: Rays,
     *,
     shift: tuple[Any, Any, Any],
-    tables: tuple[LightSampleTable, ...],
+    samples: LightTable | None,
     visible: Visibility,
 ) -> PerRay:
     """Return the light that each froxel scatters to the camera, a colour [W/(m^3 sr)].
 
     `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `shift`: of the points from the
-    middles of the froxels, in parts of a froxel across, down and in depth; `tables`: of the points of lights with
-    extent; `visible`: which light reaches which point.
+    middles of the froxels, in parts of a froxel across, down and in depth; `samples`: those of all area lights, summed
+    in one loop; `visible`: which light reaches which point.
     """
     points = _froxel_points(view, grid, rays, shift)
     total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)
-    loops = () if view.features.bounded else tables
-    for number, light in enumerate(view.lights):
-        if any(light.source == table.source for table in loops):
-            continue
+
+    def scattered(light: Light, number: Any) -> Any:
         lit = visible(points.point, light, number) if view.features.shadows else True
-        total += light.intensity * _weight(view, light, points, lit)
-        if view.features.bounded and number % _UNROLLED == _UNROLLED - 1:
-            dr.eval(total)
-    for table in loops:
-        like = next(light for light in view.lights if light.source == table.source)
-        total += like.intensity * _sum_over_points(view, table, like, points)
+        return light.intensity * _weight(view, light, points, lit)
+
+    for number, light in enumerate(light for light in view.lights if light.facing is None):
+        total += scattered(light, number)
+    if samples is not None:
+        like = next(light for light in view.lights if light.facing is not None)
+        total = summed(samples.count, lambda number: scattered(samples.light(number, like), number), total)
     return view.medium.unit * total * (0.25 * dr.inv_pi)
 
 
@@ -125,32 +112,6 @@ def _froxel_points(view: View, grid: Grid, rays: Rays, shift: tuple[Any, Any, An
     rays = Rays(view.origin, direction, direction, dr.gather(tuple, rays.crossed, column))
     unit = ray * dr.rsqrt(dr.squared_norm(ray))
     return FroxelPoints(point, unit, _least_square(grid, begin, end), rays, (begin * length, end * length))
-
-
-def _sum_over_points(view: View, table: LightSampleTable, like: Light, points: FroxelPoints) -> Any:
-    """Return the sum of the weights of the points of a light, in one loop.
-
-    All that a weight needs follows from the coordinates of a froxel in the frame of the light sample, c along its
-    normal: r, the cosine c/r at the light, and the place in its map.
-    """
-    medium = view.medium
-
-    def term(number):
-        frame = frame_at(table.frames, number)
-        away = points.point - frame.position
-        a, b, c = frame.local(away)
-        square = dr.fma(a, a, dr.fma(b, b, c * c))
-        # At the light itself there is no direction: any will do.
-        inverse = dr.rsqrt(dr.maximum(square, 1e-30))
-        strength = dr.maximum(c, 0) * inverse * dr.rcp(dr.maximum(square, points.least))
-        value = strength * medium.mean_source(points.rays, *points.ends, _at(-dr.dot(away, points.unit) * inverse))
-        if view.features.shadows:
-            lit = view.visible(points.point, frame) if table.maps is None else table.maps.lit(number, (a, b, c))
-            value = dr.select(lit, value, 0)
-        depths = medium.depth_to_light(frame, points.point, square * inverse)
-        return value * medium.transmittance(depths)
-
-    return summed(table.count, term, view.lit_by(like).nothing(dr.width(points.point)))
 
 
 def _least_square(grid: Grid, begin: Any, end: Any) -> Any:

@@ -13,28 +13,28 @@ Wronski 2014, *Volumetric fog: unified, compute shader based solution to atmosph
 from dataclasses import dataclass
 
 import drjit as dr
-import mitsuba as mi
 
 from realtime.memory import check_memory
 from realtime.methods.froxel_fog.grid import accumulated, airlight_at_pixels, column_rays, view_grid
-from realtime.methods.froxel_fog.injection import LightSampleTable, Visibility, frame_shift, scattered_light
+from realtime.methods.froxel_fog.injection import Visibility, frame_shift, scattered_light
 from realtime.methods.interface.method import Layers, Method, View
 from realtime.numerics.array_types import bytes_of
 from realtime.parameters import parameter
-from realtime.scene.light_samples import frame_at, light_frames
+from realtime.scene.light_samples import LightTable, light_tables
 from realtime.scene.lights import Light
-from realtime.shadow_maps.hemisphere_map import cast_hemisphere_maps, maps_memory
+from realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps, maps_memory
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_maps, lit_in_map, map_memory, map_size
 
 _NUMBERS = 12  # of a froxel: scattered light and airlight, four each, and as much on the way
 
 
 @dataclass(frozen=True)
-class FroxelShadows:
-    """The visibility of the lights of a frame."""
+class FroxelLights:
+    """The light samples of a frame, and shadow maps; none where rays are cast."""
 
-    maps: tuple[ShadowMap, ...]  #: of the lights without extent; () where rays are cast
-    tables: tuple[LightSampleTable, ...]  #: of the others
+    samples: LightTable | None  #: of all area lights
+    maps: tuple[ShadowMap, ...] = ()  #: of the lights without extent
+    sample_maps: HemisphereMaps | None = None
 
 
 @dataclass(frozen=True)
@@ -88,30 +88,25 @@ class FroxelFog(Method):
         with_maps = self.shadow == "map" and scene.features.shadows
 
         def prepare(now):
-            by_source: dict[int | None, list[Light]] = {}
-            for light in now.lights:
-                by_source.setdefault(light.source, []).append(light)
-            maps = [cast_shadow_map(now.geometry, light, self.map) for light in by_source.pop(None, []) if with_maps]
-            tables = (self._table(now.geometry, source, points, with_maps) for source, points in by_source.items())
-            return FroxelShadows(tuple(maps), tuple(tables))
+            points = [light for light in now.lights if light.facing is not None]
+            samples = light_tables(points)[0] if points else None
+            if not with_maps:
+                return FroxelLights(samples)
+            maps = tuple(cast_shadow_map(now.geometry, light, self.map) for light in now.lights if light.facing is None)
+            if samples is None:
+                return FroxelLights(None, maps)
+            of_samples = cast_hemisphere_maps(now.geometry, samples, points[0], self.point_map, for_surfaces=False)
+            return FroxelLights(samples, maps, of_samples)
 
         return prepare
 
-    def _table(self, geometry, source, points, with_maps):
-        """Return the points of one light."""
-        count, maps = len(points), None
-        frames, _, _ = light_frames(points)
-        if with_maps:
-            maps = cast_hemisphere_maps(geometry, frames, count, self.point_map, for_surfaces=False)
-        return LightSampleTable(source, count, frames, maps)
-
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
-        grid = view_grid(view, [table.frames.position for table in state.tables], size=self.grid_size, far=self.far)
+        grid = view_grid(view, state.samples, size=self.grid_size, far=self.far)
         dr.eval(grid.far)
         shift = frame_shift(view) if self.noisy else (0, 0, 0)
         visible, rays = _visibility(view, state, self.shadow), column_rays(view, grid)
-        scattered = scattered_light(view, grid, rays, shift=shift, tables=state.tables, visible=visible)
+        scattered = scattered_light(view, grid, rays, shift=shift, samples=state.samples, visible=visible)
         dr.eval(scattered)
         return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, rays, scattered)))
 
@@ -123,18 +118,13 @@ class FroxelFog(Method):
         return ("map", {"shadow": "ray"}), ("resolution", {"width": size[0], "height": size[1]}), ("steps", None)
 
 
-def _visibility(view: View, shadows: FroxelShadows, shadow: str) -> Visibility:
-    def visible(point, light: Light, number: int):
+def _visibility(view: View, lights: FroxelLights, shadow: str) -> Visibility:
+    def visible(point, light: Light, number):
         if shadow == "ray":
             return view.visible(point, light)
-        if light.source is None:
-            return lit_in_map(shadows.maps[number], light, point)
-        # In bounded media light samples come one by one.
-        table = next(table for table in shadows.tables if table.source == light.source)
-        before = next(index for index, other in enumerate(view.lights) if other.source == light.source)
-        assert table.maps is not None
-        own = mi.UInt32(number - before)
-        frame = frame_at(table.frames, own)
-        return table.maps.lit(own, frame.local(point - frame.position))
+        if light.facing is None:
+            return lit_in_map(lights.maps[number], light, point)
+        assert lights.sample_maps is not None
+        return lights.sample_maps.of(number, light).lit(point)
 
     return visible

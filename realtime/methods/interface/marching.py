@@ -21,7 +21,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.functions import summed
 from realtime.scene.media.medium import LitRays
 
 _LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
@@ -49,11 +48,11 @@ class Steps:
         return dr.fma(self.height, self.height, dr.square(x - self.foot)) / self.height
 
 
-def steps_between(x0: Any, x1: Any, steps: int, light: tuple[Any, Any] | None = None, asked: Any = True) -> Steps:
+def steps_between(x0: Any, x1: Any, steps: int, light: tuple[Any, Any] | None = None) -> Steps:
     """Return equal steps from `x0` to `x1` [m].
 
     `light` is the foot [m] and the height [m] of one at whose angle the steps are to be equal; then `x1` may be
-    infinite. Rays that are not `asked` stay on the spot.
+    infinite.
     """
     if light is None:
         begin, end, place = x0, x1, (None, None)
@@ -63,31 +62,8 @@ def steps_between(x0: Any, x1: Any, steps: int, light: tuple[Any, Any] | None = 
         height = dr.maximum(height, _LEAST_HEIGHT * gap)
         end = dr.select(dr.isfinite(x1), dr.atan2(x1 - foot, height), 0.5 * dr.pi)
         begin, place = dr.atan2(x0 - foot, height), (foot, height)
-    walks = asked & (x1 > x0)
+    walks = x1 > x0
     return Steps(x0, x1, dr.select(walks, begin, 0), dr.select(walks, (end - begin) / steps, 0), *place)
-
-
-def midpoint_sum(steps: Steps, count: int, zero: Any, sample: Callable[[Any], Any], shift: Any = 0.5) -> Any:
-    """Return the sum of `sample(x)` dx over the steps of every ray, in one loop: the kernel does not grow with them.
-
-    Parameters
-    ----------
-    steps, count
-        The steps, and how many.
-    zero
-        The sum of nothing, one for each ray.
-    sample
-        The integrand at distances [m].
-    shift
-        Where in a step it is asked, from 0 to 1.
-    """
-    Float = type(steps.width)
-
-    def term(index):
-        x = steps.place(dr.fma(Float(index) + shift, steps.width, steps.begin))
-        return sample(x) * steps.stretch(x)
-
-    return summed(count, term, zero + dr.zeros(Float, dr.width(steps.width))) * steps.width
 
 
 def marched_integral(
@@ -111,7 +87,7 @@ def marched_integral(
     spacing
         'equiangular' in the angle at the light, or 'uniform' in the distance; for a light at infinity both are uniform.
     lit
-        Says whether the light reaches points [m].
+        Says whether the light reaches the rays at distances [m].
     running
         Whether the camera's optical depth is the midpoint sum over the steps, as in engines, instead of the medium's
         exact depth. Where densities vary, the sum is wrong by a term in the square of the step.
@@ -126,23 +102,20 @@ def marched_integral(
     between = marched_steps(airlight, distance, steps, spacing)
     lanes = dr.width(distance)
 
-    def sample(x, camera=None):
-        reached = (between.width > 0) & lit(airlight.rays.at(x))
-        return dr.select(reached, airlight.source(x, camera), 0)
-
-    if not running:
-        return midpoint_sum(between, steps, airlight.nothing(lanes), sample, shift)
     Float = type(between.width)
 
     def step(index, depths, total):
         x = between.place(dr.fma(Float(index) + shift, between.width, between.begin))
         length = between.width * between.stretch(x)
-        added = [sigma * length for sigma in airlight.medium.extinction(airlight.rays, x)]
-        value = sample(x, [depth + shift * more for depth, more in zip(depths, added, strict=True)])
-        depths = [depth + more for depth, more in zip(depths, added, strict=True)]
-        return index + 1, depths, total + value * length
+        camera = None
+        if running:
+            added = [sigma * length for sigma in airlight.medium.extinction(airlight.rays, x)]
+            camera = [depth + shift * more for depth, more in zip(depths, added, strict=True)]
+            depths = [depth + more for depth, more in zip(depths, added, strict=True)]
+        reached = (between.width > 0) & lit(x)
+        return index + 1, depths, total + dr.select(reached, airlight.source(x, camera), 0) * length
 
-    before = airlight.medium.optical_depth(airlight.rays, 0, between.x0)
+    before = airlight.medium.optical_depth(airlight.rays, 0, between.x0) if running else ()
     depths = [depth + dr.zeros(Float, lanes) for depth in before]
     *_, total = dr.while_loop(
         state=(mi.UInt32(0), depths, airlight.nothing(lanes)),

@@ -9,7 +9,7 @@ Fig. 4.9.
 The stages of a frame:
 
 1. `prepare`: a table of the light samples, and their maps.
-2. Airlight of every `scale`-th pixel by `steps` steps for each point (`sources.py`), a number per ray and light.
+2. Airlight of every `scale`-th pixel by `steps` steps for each point, a number per ray and light.
 3. The bilateral filter, on log(1 + L / mean L), and joint up-sampling with a depth test.
 4. The fraction of each light that reaches each pixel's surface, and its filter, before anything is
    shaded.
@@ -19,8 +19,7 @@ With `interleave` each pixel of a tile of 4 x 4 takes one of the points and a sh
 over the tile, by depth, is that of all points and of sixteen times as many steps. The mean of the fraction is a ratio
 of two means (Heitz, Hill, McGuire 2018): what a tile does not shadow is not noisy.
 
-Lights without extent are one point. Their surfaces are lit by shadow rays and have no penumbra to filter. In bounded
-media every point of a light is asked, also with `interleave`.
+Lights without extent are one point. Their surfaces are lit by shadow rays and have no penumbra to filter.
 """
 
 import math
@@ -55,14 +54,13 @@ from realtime.methods.soft_shafts.sources import (
     SourceState,
     blockers_of,
     few_pixels,
-    integral_of_points,
     penumbra_width,
     reached_surfaces,
     source_state,
 )
 from realtime.numerics.array_types import two_numbers
-from realtime.scene.light_samples import frame_at
-from realtime.scene.lights import sources_of
+from realtime.numerics.functions import summed
+from realtime.scene.lights import Light, sources_of
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
 from realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
 
@@ -150,23 +148,22 @@ class _Frame:
     def airlight(self, number: int, source: list[int]) -> Any:
         """Return the radiance that a source scatters into every ray, in the order of the view."""
         view, p, few = self.view, self.parameters, self.few
-        lights = [view.lights[light] for light in source]
-        if view.features.bounded or lights[0].facing is None:
-            integral = sum(
-                marched_integral(
-                    few.lit_by(few.lights[light]),
-                    few.distance,
-                    steps=p.steps,
-                    spacing=p.spacing,
-                    lit=self._lit(number, light, place),
-                )
-                for place, light in enumerate(source)
-            )
+        state, like = self.states[number], view.lights[source[0]]
+        table = state.samples
+
+        def of_sample(index: Any, shift: Any = 0.5) -> Any:
+            light = like if table is None else table.light(index, like)
+            how: dict[str, Any] = {"steps": p.steps, "spacing": p.spacing, "lit": self._lit(state, light, index)}
+            return marched_integral(few.lit_by(light), few.distance, shift=shift, **how)
+
+        if table is None:
+            integral = of_sample(0)
+        elif p.interleave:
+            fraction = self._fraction(self.few_raster, table.count)
+            integral = table.count * of_sample(fraction.number, fraction.shift)
+            integral = tile_average(integral, self.few_raster, guides=(self.few_depth,))
         else:
-            fraction = self._fraction(self.few_raster, lights) if p.interleave else None
-            integral = integral_of_points(few, self.states[number], len(lights), fraction, p)
-            if fraction is not None:
-                integral = tile_average(integral, self.few_raster, guides=(self.few_depth,))
+            integral = summed(table.count, of_sample, few.lit_by(like).nothing(dr.width(few.distance)))
         integral = _smooth_airlight(integral, self.few_raster, depth=self.few_depth, p=p)
         dr.eval(integral, self.few_depth)
         if p.scale == 1:
@@ -176,7 +173,7 @@ class _Frame:
             place = {"column": view.pixel - row * self.raster.width, "row": row}
             own = depth_guide(view.distance, p.hz)
             integral = upsample(integral, self.few_depth, own.values, self.few_raster, scale=p.scale, **place)
-        return view.medium.radiance(lights[0], integral)
+        return view.medium.radiance(like, integral)
 
     def visibility(self, number: int, source: list[int]) -> list[Any]:
         """Return the fraction of a source that reaches the surfaces, or one for each of its lights."""
@@ -193,20 +190,20 @@ class _Frame:
         if p.filter == "none" and not p.interleave:
             return [there & self._reached(state, place, light, point) for place, light in enumerate(lights)]
         if p.interleave:
-            number = self._fraction(self.raster, lights).number
-            own = reached_surfaces(whole, state, lambda _: number, 1, p)
+            number = self._fraction(self.raster, len(lights)).number
+            own = reached_surfaces(whole, state, lights[0], lambda _: number, 1, p)
             if p.narrow:
                 # With the means over tiles: who asks for it later would cast its rays again.
                 dr.schedule(own.lit, own.all)
             lit = self._over_tiles(own).fraction
         else:
-            lit = reached_surfaces(whole, state, lambda index: index, len(lights), p).fraction
+            lit = reached_surfaces(whole, state, lights[0], lambda index: index, len(lights), p).fraction
         if p.hd == AUTO:
             dr.eval(lit)
-            width = self._penumbra_width(state, len(lights))
+            width = self._penumbra_width(state, lights[0])
             dr.eval(width)
             if p.interleave and p.narrow:
-                lit = self._where_narrow(lit, width, own, number, state, len(lights))
+                lit = self._where_narrow(lit, width, own, number, state, lights)
                 del own  # two images that the filter needs not
             lit = self._smooth_by_width(lit, width, len(lights))
         elif p.filter != "none":
@@ -219,9 +216,9 @@ class _Frame:
         lit = dr.gather(type(lit), lit, view.pixel)
         return [lit]
 
-    def _penumbra_width(self, state: SourceState, points: int) -> Any:
+    def _penumbra_width(self, state: SourceState, like: Light) -> Any:
         few, step = few_pixels(self.raster)
-        blockers = blockers_of(self.rays(small_pixels(few, step, self.raster.width)), state, points)
+        blockers = blockers_of(self.rays(small_pixels(few, step, self.raster.width)), state, like)
         distance, camera = self.whole.distance, self.view.camera
         return penumbra_width(blockers, distance, camera, state.width, self.raster, guide=self.depth)
 
@@ -230,20 +227,22 @@ class _Frame:
         sums = two_numbers(type(self.view.distance))(reached.lit, reached.all)
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
 
-    def _where_narrow(self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, points: int) -> Any:
+    def _where_narrow(
+        self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, lights: list[Light]
+    ) -> Any:
         """Return the fraction, with the rest of each pixel's group of light samples where penumbrae are narrow.
 
         Adjacent pixels lie in different groups of `_GROUP` light samples; the filter that follows combines four groups.
         A pixel has already tested one sample of its group.
         """
         p = self.parameters
-        group = min(_GROUP, points)
+        group = min(_GROUP, len(lights))
         asked = (lit > 0) & (lit < 1) & (width < p.narrow)
 
         def other(index: Any) -> Any:
             return number // group * group + (number + 1 + index) % group
 
-        more = reached_surfaces(self.whole, state, other, group - 1, p, asked)
+        more = reached_surfaces(self.whole, state, lights[0], other, group - 1, p, asked)
         lit = dr.select(asked, Reached(own.lit + more.lit, own.all + more.all).fraction, lit)
         dr.eval(lit)
         return lit
@@ -254,29 +253,25 @@ class _Frame:
         hd = dr.clip(fraction / points * width, least, _MOST_AUTO)
         return separable(lit, self.raster, hd=hd, guides=(self.depth,), support=2.0, most=_MOST_AUTO)
 
-    def _lit(self, number: int, light: int, place: int) -> Callable[[Any], Any]:
-        """Return a test of whether a light reaches points of the few rays."""
-        view, p = self.few, self.parameters
+    def _lit(self, state: SourceState, light: Light, number: Any) -> Callable[[Any], Any]:
+        """Return a test of whether a light of a number in its source reaches the few rays at distances [m]."""
+        view, p, maps = self.few, self.parameters, state.maps
         if not view.features.shadows or p.shadow == "none":
-            return lambda point: True
+            return lambda x: True
         if p.shadow == "ray":
-            return lambda point: view.visible(point, view.lights[light])
-        state = self.states[number]
-        if isinstance(state.maps, HemisphereMaps):
-            return lambda point: _nearer(state, place, point)
-        shadow_map = state.maps
-        assert shadow_map is not None
-        return lambda point: lit_in_map(shadow_map, view.lights[light], point)
+            return lambda x: view.visible(view.at(x), light)
+        if isinstance(maps, HemisphereMaps):
+            return maps.of(number, light).lit_along(view)
+        assert maps is not None
+        return lambda x: lit_in_map(maps, light, view.at(x))
 
-    def _reached(self, state: SourceState, place: int, light: Any, point: Any) -> Any:
+    def _reached(self, state: SourceState, number: int, light: Light, point: Any) -> Any:
         if self.parameters.surfaces == "ray":
             return self.view.visible(point, light)
-        frame = frame_at(state.frames, mi.UInt32(place))
-        local = frame.local(point - frame.position)
         assert isinstance(state.maps, HemisphereMaps)
-        return state.maps.lit_surface(mi.UInt32(place), local)
+        return state.maps.of(mi.UInt32(number), light).lit_surface(point)
 
-    def _fraction(self, raster: Raster, lights: list[Any]) -> Fraction:
+    def _fraction(self, raster: Raster, samples: int) -> Fraction:
         """Return which light sample each pixel takes, and how far its steps are shifted."""
         column, row = raster.places()
         # The order of ordered dithering (Bayer 1973): pixels side by side are far apart in it, and so are their points.
@@ -284,14 +279,7 @@ class _Frame:
         order = (other & 1) * 8 + (row & 1) * 4 + (other & 2) + ((row & 2) >> 1)
         # Another lattice, so that the shifts of neighbouring points are far apart too.
         shift = (order * 7 + 3) & 15
-        return Fraction(order % len(lights), (type(self.view.distance)(shift) + 0.5) / 16)
-
-
-def _nearer(state: SourceState, place: int, point: Any) -> Any:
-    frame = frame_at(state.frames, mi.UInt32(place))
-    local = frame.local(point - frame.position)
-    assert isinstance(state.maps, HemisphereMaps)
-    return state.maps.lit(mi.UInt32(place), local)
+        return Fraction(order % samples, (type(self.view.distance)(shift) + 0.5) / 16)
 
 
 def _smooth_fraction(

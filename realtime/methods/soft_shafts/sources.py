@@ -1,15 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""The airlight of a source along rays, by the midpoint rule with one visibility test a step and light sample.
-
-A table holds the N light samples of an area light. In the orthonormal frame of a light sample, whose normal is the
-third axis, a ray is o + x d, and all that an integrand needs follows from its three coordinates (a, b, c) at x:
-
-    r^2 = a^2 + b^2 + c^2,    cos_l = c / r,    cos_scatter = -(o . d + x) / r,
-
-and the place in the map follows too. A step therefore costs one multiply-add for each coordinate, one square root, one
-exponential, one look-up. A first loop is over the points, a second over the steps: the kernel grows with neither.
-
-Uniform steps that no surface ends stop at 20 optical depths, where e^-20 = 2e-9 is left.
+r"""Light samples of a source as methods ask them, and their shadow maps.
 
 **Which fraction of an area light reaches the visible surfaces**, and how wide its penumbrae are there.
 
@@ -35,13 +25,11 @@ import mitsuba as mi
 import numpy as np
 
 from realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
-from realtime.methods.interface.marching import midpoint_sum, steps_between
 from realtime.methods.interface.method import View
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from realtime.numerics.array_types import aligned_array, two_numbers
-from realtime.numerics.functions import summed
 from realtime.scene.camera import Camera
-from realtime.scene.light_samples import LightFrame, frame_at, light_frames
+from realtime.scene.light_samples import LightTable, light_tables
 from realtime.scene.lights import Light
 from realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
@@ -51,7 +39,7 @@ from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 class SourceState:
     """The state of one source, made again when lights or shapes move."""
 
-    frames: LightFrame | None  #: the points of an area light, one a lane
+    samples: LightTable | None  #: those of an area light
     width: Any  #: of that light, of a square with its mean square extent [m]
     flat: bool  #: whether all points of that light face the same way
     maps: HemisphereMaps | ShadowMap | None  #: None where nobody asks them
@@ -65,14 +53,15 @@ def source_state(
     if lights[0].facing is None:
         maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
         return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
-    frames, positions, normals = light_frames(lights)
+    (table,) = light_tables(lights)
+    positions = np.stack([np.array(column, dtype=np.float64) for column in table.columns[:3]])
     # The mean square distance from the middle of a square of the side L is L^2 / 6.
-    spread = np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=1))
+    spread = np.mean(np.sum((positions - positions.mean(axis=1, keepdims=True)) ** 2, axis=0))
     hemispheres = None
     if with_maps:
-        hemispheres = cast_hemisphere_maps(scene, frames, len(lights), size, for_surfaces=for_surfaces)
-    flat = bool(np.all(normals == normals[0]))
-    return SourceState(frames, aligned_array(Float, np.array([np.sqrt(6 * spread)])), flat, hemispheres)
+        hemispheres = cast_hemisphere_maps(scene, table, lights[0], size, for_surfaces=for_surfaces)
+    flat = all(light.facing is lights[0].facing for light in lights)
+    return SourceState(table, aligned_array(Float, np.array([np.sqrt(6 * spread)])), flat, hemispheres)
 
 
 @dataclass(frozen=True)
@@ -81,58 +70,6 @@ class Fraction:
 
     number: Any  #: of the light sample
     shift: Any  #: of the steps, from 0 to 1 of one
-
-
-def integral_of_points(
-    view: View, state: SourceState, points: int, fraction: Fraction | None, p: SoftShaftsParameters
-) -> Any:
-    """Return the sum of the airlight integrals of the points of an area light [1/m].
-
-    `view`: the rays, in one medium without bounds; `state`: the light, with its maps if `shadow=map`; `points`: how
-    many points it has; `fraction`: one point for each ray, counted `points` times; None for all; `p`: the parameters.
-    """
-    Float = type(view.distance)
-    nothing = view.lit_by(view.lights[0]).nothing(dr.width(view.distance))
-    if fraction is not None:
-        return points * _airlight_of_point(view, state, fraction.number, fraction.shift, p)
-
-    return summed(points, lambda number: _airlight_of_point(view, state, number, Float(0.5), p), nothing)
-
-
-def _airlight_of_point(view: View, state: SourceState, number: Any, shift: Any, p: SoftShaftsParameters) -> Any:
-    Float, medium = type(view.distance), view.medium
-    frame = frame_at(state.frames, number)
-    origin, direction = frame.local(view.origin - frame.position), frame.local(view.direction)
-    along = sum(o * d for o, d in zip(origin, direction))
-    begin, end = medium.part(view, Float(0), view.distance, uniform=p.spacing == "uniform")
-    # The plane of the light sample cuts the ray.
-    meets = -origin[2] / direction[2]
-    begin = dr.select(direction[2] > 0, dr.maximum(meets, begin), begin)
-    end = dr.select(direction[2] < 0, dr.minimum(meets, end), end)
-    lit_part = (end > begin) & ((direction[2] != 0) | (origin[2] > 0))
-    at_light = None
-    if p.spacing == "equiangular":
-        (oa, ob, oc), (da, db, dc) = origin, direction
-        height = dr.sqrt(dr.square(ob * dc - oc * db) + dr.square(oc * da - oa * dc) + dr.square(oa * db - ob * da))
-        at_light = -along, height
-    steps = steps_between(begin, end, p.steps, at_light, asked=lit_part)
-
-    def sample(x: Any):
-        a, b, c = (dr.fma(d, x, o) for o, d in zip(origin, direction))
-        inverse = dr.rsqrt(dr.fma(a, a, dr.fma(b, b, c * c)))
-        r = dr.fma(a, a, dr.fma(b, b, c * c)) * inverse
-        weight = dr.maximum(c, 0) * inverse * dr.square(inverse)
-        value = weight * medium.source(view, x, lambda phase: phase.evaluate(-(along + x) * inverse))
-        lit = lit_part
-        if view.features.shadows and p.shadow == "map":
-            assert isinstance(state.maps, HemisphereMaps)
-            lit = lit & state.maps.lit(number, (a, b, c), lit_part)
-        elif view.features.shadows and p.shadow == "ray":
-            lit = lit & view.visible(view.at(x), frame)
-        return dr.select(lit, value * medium.both_ways(view, x, frame, r), 0)
-
-    nothing = view.lit_by(view.lights[0]).nothing(dr.width(view.distance))
-    return midpoint_sum(steps, p.steps, nothing, sample, shift)
 
 
 #: c of hd = c w / N: what smooths the staircase of N levels best (`tests/.../test_auto_width.py` fits it again).
@@ -160,6 +97,7 @@ class Reached:
 def reached_surfaces(
     view: View,
     state: SourceState,
+    like: Light,
     number_of: Callable[[Any], Any],
     count: int,
     p: SoftShaftsParameters,
@@ -167,18 +105,21 @@ def reached_surfaces(
 ) -> Reached:
     """Return the part of an area light that reaches `asked` surfaces of a view; others return 0.
 
-    `view`: the rays, row by row; `state`: the light; `number_of`, `count`: which light sample each ray asks first,
-    second and so on, counted from 0, and how many; `p`: the parameters.
+    `view`: the rays, row by row; `state`, `like`: the light, and one of its samples; `number_of`, `count`: which light
+    sample each ray asks first, second and so on, counted from 0, and how many; `p`: the parameters.
     """
     Float = type(view.distance)
     there = dr.isfinite(view.distance) & asked
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
+
+    def of_sample(index: Any) -> list[Any]:
+        return _reached_of_sample(view, state, like, place, there, number_of(index), p)
+
     if count == 1:
-        return Reached(*_reached_of_point(view, state, place, there, number_of(mi.UInt32(0)), p))
+        return Reached(*of_sample(mi.UInt32(0)))
 
     def add(index: Any, sums: Any):
-        more = _reached_of_point(view, state, place, there, number_of(index), p)
-        return index + 1, [so_far + term for so_far, term in zip(sums, more, strict=True)]
+        return index + 1, [so_far + term for so_far, term in zip(sums, of_sample(index), strict=True)]
 
     _, sums = dr.while_loop(
         state=(mi.UInt32(0), [dr.zeros(Float, dr.width(view.distance)) for _ in range(2)]),
@@ -189,29 +130,25 @@ def reached_surfaces(
     return Reached(*sums)
 
 
-def _reached_of_point(
-    view: View, state: SourceState, place: Any, there: Any, number: Any, p: SoftShaftsParameters
-) -> Any:
+def _reached_of_sample(
+    view: View, state: SourceState, like: Light, place: Any, there: Any, number: Any, p: SoftShaftsParameters
+) -> list[Any]:
     """Return the terms of one light sample in the sums of `Reached`."""
-    Float = type(view.distance)
-    frame = frame_at(state.frames, number)
-    a, b, c = frame.local(place - frame.position)
-    square = dr.fma(a, a, dr.fma(b, b, c * c))
-    r = dr.sqrt(square)
-    weight = Float(1) if state.flat and fraction_is_plain(p) else dr.maximum(c, 0) / (square * r)
+    assert state.samples is not None
+    light = state.samples.light(number, like)
+    away = place - light.position
+    square = dr.squared_norm(away)
+    # Without shared samples those that face one way count alike: the fraction has N + 1 levels.
+    alike = state.flat and not p.interleave
+    weight = 1 if alike else dr.maximum(dr.dot(away, light.normal), 0) / (square * dr.sqrt(square))
     if not view.features.shadows:
         lit = there
     elif p.surfaces == "map":
         assert isinstance(state.maps, HemisphereMaps)
-        lit = state.maps.lit_surface(number, (a, b, c))
+        lit = state.maps.of(number, light).lit_surface(place)
     else:
-        lit = view.visible(place, frame, there)
-    return [dr.select(there & lit, weight, 0), dr.select(there, weight, 0)]
-
-
-def fraction_is_plain(p: SoftShaftsParameters) -> bool:
-    """Return whether every light sample counts alike, so that the fraction has N + 1 levels."""
-    return not p.interleave
+        lit = view.visible(place, light, there)
+    return [dr.select(there & lit, type(square)(weight), 0), dr.select(there, type(square)(weight), 0)]
 
 
 def few_pixels(raster: Raster) -> tuple[Raster, int]:
@@ -244,27 +181,27 @@ def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, ras
     return width * mean / pixel
 
 
-def blockers_of(view: View, state: SourceState, count: int) -> Any:
+def blockers_of(view: View, state: SourceState, like: Light) -> Any:
     """Return the sum of log((d_r - d_b) / d_b) over the light samples that something blocks, and how many these are.
 
-    `view`: rays to surfaces; `state`, `count`: the light, with its maps, and how many points it has.
+    `view`: rays to surfaces; `state`, `like`: the light, with its maps, and one of its samples.
     """
-    Float = type(view.distance)
+    Float, table, maps = type(view.distance), state.samples, state.maps
+    assert table is not None
+    assert isinstance(maps, HemisphereMaps)
     there = dr.isfinite(view.distance)
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
 
     def add(number: Any, near: Any, blocked: Any):
-        assert isinstance(state.maps, HemisphereMaps)
-        frame = frame_at(state.frames, number)
-        local = frame.local(place - frame.position)
-        beyond = state.maps.beyond(number, local, there)
-        before = there & (beyond > _NEARER) & (local[2] > 0)
+        light = table.light(number, like)
+        beyond = maps.of(number, light).beyond(place, there)
+        before = there & (beyond > _NEARER) & (dr.dot(place - light.position, light.normal) > 0)
         return number + 1, near + dr.select(before, dr.log(beyond), 0), blocked + dr.select(before, Float(1), 0)
 
     nothing = dr.zeros(Float, dr.width(view.distance))
     _, near, blocked = dr.while_loop(
         state=(mi.UInt32(0), nothing, +nothing),
-        cond=lambda number, near, blocked: number < count,
+        cond=lambda number, near, blocked: number < table.count,
         body=add,
         labels=("number", "near", "blocked"),
     )

@@ -231,9 +231,9 @@ class LitRays:
         light, medium = self.light, self.medium
         s = x - self.geometry.foot
         square = dr.fma(s, s, dr.square(self.geometry.height)) if light.w else type(x)(1)
-        r = dr.sqrt(square)
+        inverse = dr.rsqrt(square)
+        r, strength = square * inverse, dr.square(inverse)
         value = medium.source(self.rays, x, self.angle(s, r)) * medium.both_ways(self.rays, x, light, r, camera)
-        strength = dr.rcp(square) if light.w else 1
         return value * (strength * self.geometry.falloff(light, x) if light.varies else strength)
 
     def angle(self, s, r) -> Angle:
