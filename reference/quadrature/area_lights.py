@@ -12,8 +12,8 @@ a ray receive, from their own samples,
 
     L = exp(-tau_camera)  int Le V f cos_s exp(-s tau_shadow) domega,
 
-f cos_s by Mitsuba's `BSDF.eval`. For a flat light V is exact along sections, and samples are drawn where V is 1. A few
-fixed sections first find the points that see only a part of a flat light: these get sections in pairs.
+f cos_s by Mitsuba's `BSDF.eval`. V is exact along sections, and samples are drawn where V is 1. A few fixed sections
+first find the points that see only a part of a light that is no mesh: these get sections in pairs.
 `reference.quadrature.light_samples` draws both kinds of samples, `reference.quadrature.replicates` says how many a ray
 gets: eight independent scramblings each give a mean, and their spread the standard error.
 """
@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from reference.quadrature.fields import field_of, optical_depth
 from reference.quadrature.light_airlight import worth_of_doubt
-from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points, solid_angle
+from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points, solid_angle, to_sphere
 from reference.quadrature.replicates import (
     PILOT,
     REPLICATES,
@@ -48,6 +48,7 @@ from reference.quadrature.stretches import Terms, cosine_profile, sums_of
 from reference.quadrature.surface import Reflection, SurfaceHits
 from reference.scene.area_light import ReferenceAreaLight
 from reference.scene.read import ReferenceScene
+from reference.scene.shapes import distance_to
 from reference.visibility.candidates import Ball
 from reference.visibility.certificate import LitIntervals, RandomChecks
 from reference.visibility.lit_intervals import IN_PLANE, Obstacles, before_light, lit_intervals, obstacles
@@ -304,9 +305,13 @@ class _View:
 
 
 def _partly_hidden(beam: Beam, active: Index, turn: float) -> NDArray[np.bool_]:
-    """Return from which surface points a flat light is not seen as a whole, as a few sections say."""
-    hidden = np.zeros(len(active), bool)
-    if beam.light.kind in ("rectangle", "disk"):
+    """Return from which surface points a light is not seen as a whole, as a few sections say.
+
+    None of a mesh, and of a sphere into which a shape reaches: these have no sections but short ones.
+    """
+    hidden, light = np.zeros(len(active), bool), beam.light
+    whole_sphere = light.kind == "sphere" and distance_to(beam.known().shapes, light.centre) >= light.radius
+    if light.kind in ("rectangle", "disk") or whole_sphere:
         square = np.stack([(np.arange(_PROBES) + 0.5) / _PROBES, np.full(_PROBES, 0.5)], axis=1)
         points = RayPoints(square, np.zeros((len(active), REPLICATES, 2)), "")
         for rows, _, (row, _, weight), whole in _View(beam, points, turn, True).seen(active):
@@ -324,7 +329,7 @@ def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Refl
     light, reference, each = view.beam.light, view.beam.scene, len(view.points)
     total, fraction = np.zeros((len(active), 3, REPLICATES)), np.ones((len(active), REPLICATES))
     for rows, point, (row, place, weight), whole in view.seen(active):
-        if view.even and light.kind == "rectangle":
+        if view.even and light.kind != "disk":
             means = whole.reshape(len(rows), REPLICATES, -1).mean(axis=2)
             fraction[rows] = means / solid_angle(light, point)[:, None]
         of = rows[row // each]
@@ -332,6 +337,8 @@ def _reflected(view: _View, active: Index, shadow_scale: float, reflection: Refl
         way = place - point
         r = np.linalg.norm(way, axis=1)
         towards = way / np.maximum(r, np.finfo(float).tiny)[:, None]
+        if light.kind == "sphere":
+            r = to_sphere(light, point - light.centre, towards)
         value = reflection(active[of], towards)
         shadow = optical_depth(reference, point, towards, np.zeros(len(of)), shadow_scale * r)
         radiance = value * np.exp(-shadow) * weight[:, None] * light.radiance

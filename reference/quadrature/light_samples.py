@@ -39,8 +39,14 @@ azimuths of a rectangle are therefore even, and its whole solid angle, which is 
 a plane before a rectangle, 64 points in each of eight replicates leave 4.9e-3 of a penumbra, 64 sections by length
 1.3e-3, even pairs of them 2.2e-4; 256 sections leave 2.4e-4 and 2.4e-5, as root mean squares over seeds. Sections
 across an edge of the shadow would leave next to nothing, but sections along it are visible as a whole or not at all and
-leave 1/N: hence the axes are turned. A sphere fills a cone of directions, where sections would be arcs: there each is
-so short that it is seen or not.
+leave 1/N: hence the axes are turned.
+
+**A sphere** is seen from a point at the distance d from its centre as the disk that its tangents touch, which faces the
+point, a distance of d - R^2/d away, and has the radius R sqrt(1 - R^2/d^2): both fill the same cone of directions, so
+the sections are those of that disk. Azimuths of a disk follow sin(delta) = S sin(g), with g even. The solid angle of the
+cone, 2 pi (1 - sqrt(1 - R^2/d^2)), is the control variate. The disk is within the sphere: what stands before the disk
+stands before the sphere, unless it reaches into the sphere. Then, and where the sphere is seen as a whole, the sample of
+the cone is even and its section so short that it is seen or not.
 
 **On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`), and the rest of the
 coordinate serves within the triangle: along rays as above in one that is near, evenly over its area in others. For
@@ -64,7 +70,7 @@ _CELLS = 8  # of the table between two corners of a light
 _CELLS_OF_MANY = 2  # of one that a single sample of a mesh asks
 _ASIDE = 1e-6  # of a cell: how far from its ends its density is looked up
 _TINY = 1e-300
-_SHORT = 1e-6  # of the radius of a sphere: the length of its sections
+_SHORT = 1e-6  # of the radius of a sphere: the length of its short sections
 
 
 @dataclass(frozen=True)
@@ -189,16 +195,17 @@ def sections_for_points(
     """Return sections of a light for surface points that lie before it, point by point, even in the solid angle.
 
     `light`: the light; `place`: the points, (points, 3) [m]; `square`: points of the unit square, (samples, 2) [1], or
-    of each surface point, (points, samples, 2). For flat lights the second number is left for the place in the visible
-    part of a section. `turn`: the angle by which the axis is turned about the way to the light [rad]; `even`: whether
-    rectangles have even azimuths instead of even solid angles.
+    of each surface point, (points, samples, 2). Where sections are not short, the second number is left for the place
+    in the visible part of a section. `turn`: the angle by which the axis is turned about the way to the light [rad];
+    `even`: for points that see a part of the light: rectangles have even azimuths instead of even solid angles, spheres
+    long sections instead of short ones.
     """
     if light.kind == "mesh":
         chosen = choose_for_points(light, place, square)
         return _before_triangles(chosen, np.repeat(place, square.shape[-2], axis=0), _SHORT * light.radius)
-    way = light.centre - place
-    if light.kind == "sphere":
+    if light.kind == "sphere" and not even:
         return _in_cone(light, place, square)
+    way = light.centre - place
     # The side of the light that lies more across the way to it.
     sides = light.frame[:2]
     side = sides[np.argmin(np.abs(way @ sides.T), axis=1)]
@@ -206,20 +213,21 @@ def sections_for_points(
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     beside = np.cross(way / np.linalg.norm(way, axis=1)[:, None], axis)
     axis = np.cos(turn) * axis + np.sin(turn) * beside
-    axes = _axes(place, axis, light.centre)
-    fan = _fan(light, axes)
+    fan = _fan(light, _axes(place, axis, light.centre))
 
     def span(z0: Array, h0: Array, z1: Array, h1: Array) -> Array:
         return np.abs(_cosine(z1, h1) - _cosine(z0, h0))
 
     phi, per_density = fan.even(square[..., 0]) if even else fan.drawn(square[..., 0], span)
     z0, h0, z1, h1 = fan.section(phi)
-    start, end = axes.point(z0, h0, phi), axes.point(z1, h1, phi)
+    start, end = fan.axes.point(z0, h0, phi), fan.axes.point(z1, h1, phi)
     return _sections(place, axis[:, None], start, end - start, span(z0, h0, z1, h1) * per_density)
 
 
 def solid_angle(light: ReferenceAreaLight, place: Array) -> Array:
-    """Return the solid angle of a rectangle from points before it, (points,) [sr], by that of its corners."""
+    """Return the solid angle of a sphere, or of a rectangle by that of its corners, from points before it [sr]."""
+    if light.kind == "sphere":
+        return 2 * np.pi * _one_minus_cosine(light, np.linalg.norm(place - light.centre, axis=1))
     x, y, z = ((place - light.centre) @ light.frame.T).T
     total = np.zeros(len(place))
     for sign, a, b in ((1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)):
@@ -249,7 +257,7 @@ class _Fan:
     axes: _Axes
     corners: Array | None  # of a polygon, along axis, up and side, (rows, k, 3); None for a disk
     normal: Array  # of the light, along the same, (rows, 3)
-    radius: float  # of a disk
+    radius: Array  # of a disk, (rows,) [m]
     cells: int = _CELLS  # of the table of sections between two corners
 
     def section(self, phi: Array) -> tuple[Array, Array, Array, Array]:
@@ -291,7 +299,7 @@ class _Fan:
         within = np.maximum(1 - n_e**2, _TINY)
         height = self.axes.height[:, None]
         beside = -height * sine  # of the centre from the half plane
-        half = np.sqrt(np.maximum(self.radius**2 - beside**2 / within, 0.0) / within)
+        half = np.sqrt(np.maximum(self.radius[:, None] ** 2 - beside**2 / within, 0.0) / within)
         z = self.axes.along[:, None] + beside * n_e * n_w / within
         h = height * cosine + beside * n_e * n_d / within
         return z - half * n_d, h + half * n_w, z + half * n_d, h - half * n_w
@@ -331,11 +339,18 @@ class _Fan:
 
 def _fan(light: ReferenceAreaLight, axes: _Axes) -> _Fan:
     rows = len(axes.along)
-    normal = axes.components(np.broadcast_to(light.normal, (rows, 1, 3)))[:, 0]
-    if light.kind == "disk":
-        return _Fan(axes, None, normal, light.radius)
+    normal, radius = np.broadcast_to(light.normal, (rows, 1, 3)), np.full(rows, light.radius)
+    if light.kind == "sphere":  # the disk that the tangents touch
+        way = light.centre - axes.origin
+        d = np.linalg.norm(way, axis=1)
+        ratio = np.minimum(light.radius / d, 1.0)
+        normal, radius = -(way / d[:, None])[:, None], light.radius * np.sqrt((1 - ratio) * (1 + ratio))
+        axes = _axes(axes.origin, axes.axis, axes.origin + ((1 - ratio) * (1 + ratio))[:, None] * way)
+    normal = axes.components(normal)[:, 0]
+    if light.kind != "rectangle":
+        return _Fan(axes, None, normal, radius)
     corners = light.corners - axes.origin[:, None]
-    return _Fan(axes, axes.components(corners), normal, 0.0)
+    return _Fan(axes, axes.components(corners), normal, radius)
 
 
 def _on_flat(fan: _Fan, square: Array) -> tuple[Array, Array]:
@@ -362,7 +377,8 @@ def _on_triangles(chosen: Choice, origin: Array, direction: Array) -> LightSampl
         corners = chosen.corners[near]
         axes = _axes(origin, np.repeat(direction, len(weight) // rows, axis=0)[near], corners.mean(axis=1))
         normal = axes.components(chosen.normal[near, None])[:, 0]
-        fan = _Fan(axes, axes.components(corners - axes.origin[:, None]), normal, 0.0, _CELLS_OF_MANY)
+        radius = np.zeros(len(near))
+        fan = _Fan(axes, axes.components(corners - axes.origin[:, None]), normal, radius, _CELLS_OF_MANY)
         found = _on_flat(fan, chosen.square[near, None])
         place[near], weight[near] = (part[:, 0] for part in found)
     shape = rows, -1, 3
@@ -402,7 +418,7 @@ class _Spread:
         return middle + phi, np.where(sine > 1, 2 * np.pi, rate)
 
 
-def _spread(height: Array, radius: float, normal: Array) -> _Spread:
+def _spread(height: Array, radius: Array | float, normal: Array) -> _Spread:
     """Return the azimuths of a disk with normals (rows, 2) across the axes, or of a sphere, whose normals are zero."""
     n_u, n_v = normal.T
     first = height**2 - radius**2 * (1 - n_u**2)
@@ -478,8 +494,7 @@ def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections
     axis = way / d
     helper = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis), axis=1)])
     helper /= np.linalg.norm(helper, axis=1)[:, None]
-    ratio = np.minimum(light.radius / d, 1.0)
-    span = ratio**2 / (1 + np.sqrt((1 - ratio) * (1 + ratio)))  # 1 - cos of the cone
+    span = _one_minus_cosine(light, d)
     down = square[..., 0] * span
     cosine, sine = 1 - down, np.sqrt(down * (2 - down))
     turn = 2 * np.pi * square[..., 1]
@@ -493,3 +508,19 @@ def _in_cone(light: ReferenceAreaLight, place: Array, square: Array) -> Sections
         np.cos(turn)[..., None] * other - np.sin(turn)[..., None] * helper
     )  # along the sphere, across the direction
     return _sections(place, around, found, _SHORT * light.radius * around, 2 * np.pi * span)
+
+
+def _one_minus_cosine(light: ReferenceAreaLight, d: Array) -> Array:
+    """Return one minus the cosine of the half angle of the cone that a sphere fills, by the distance to its centre."""
+    ratio = np.minimum(light.radius / d, 1.0)
+    return ratio**2 / (1 + np.sqrt((1 - ratio) * (1 + ratio)))
+
+
+def to_sphere(light: ReferenceAreaLight, way: Array, towards: Array) -> Array:
+    """Return how far a sphere is in unit directions that meet it, `way` from its centre, (n, 3) each [m].
+
+    Directions to the rim of the disk that the tangents touch may miss the sphere by rounding: they go to the tangent.
+    """
+    near = -np.sum(way * towards, axis=1)
+    beside = np.linalg.norm(way + near[:, None] * towards, axis=1)
+    return near - np.sqrt(np.maximum((light.radius - beside) * (light.radius + beside), 0.0))

@@ -6,6 +6,7 @@ first axis, whatever else the transform does to it, and so does this module. Sha
 normals point.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -82,6 +83,30 @@ def _read(shape) -> Array | Sphere | Disks:
         raise InputError(f"shape '{shape.id()}' is an oval disk; expected a round one, or a mesh")
     normal = np.cross(matrix[:3, 0], matrix[:3, 1])
     return Disks(matrix[None, :3, 3], normal[None] / np.linalg.norm(normal), length[:1])
+
+
+def distance_to(shapes: Shapes, point: Array) -> float:
+    """Return the distance from a point, (3,) [m], to the nearest surface of shapes [m]."""
+    spheres = np.abs(np.linalg.norm(shapes.centre - point, axis=1) - shapes.radius)
+    away = point - shapes.disks.centre
+    above = np.sum(away * shapes.disks.normal, axis=1)
+    beside = np.linalg.norm(away - above[:, None] * shapes.disks.normal, axis=1)
+    disks = np.hypot(above, np.maximum(beside - shapes.disks.radius, 0.0))
+    return min(distance_to_triangles(shapes.triangles, point), *spheres.tolist(), *disks.tolist(), math.inf)
+
+
+def distance_to_triangles(triangles: Array, point: Array) -> float:
+    """Return the distance from a point, (3,) [m], to triangles, (n, 3, 3) [m]: to their planes, or to their sides."""
+    corners = triangles - point
+    sides = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    inwards = np.einsum("tsx,tx->ts", np.cross(sides, -corners), normals)  # of a side: how far the foot lies
+    planes = np.abs(np.einsum("tx,tx->t", corners[:, 0], normals))[np.all(inwards > 0, axis=1)]
+    length = np.maximum(np.sum(sides**2, axis=2), np.finfo(float).tiny)
+    along = np.clip(-np.sum(corners * sides, axis=2) / length, 0, 1)
+    edges = np.linalg.norm(corners + along[..., None] * sides, axis=2)
+    return float(min(planes.min(initial=np.inf), edges.min(initial=np.inf)))
 
 
 def is_polygonal(shape) -> bool:

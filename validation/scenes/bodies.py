@@ -29,6 +29,7 @@ from realtime.scene.closed_mesh import (
     winding_number,
 )
 from realtime.scene.mesh_adjacency import scene_of
+from reference.scene.shapes import distance_to_triangles
 from validation.arrays import Array, Index
 
 Body = tuple[Bounds | None, ClosedMesh | None]  #: as `read_bounds` returns it
@@ -81,7 +82,7 @@ def _overlap(first: Body, second: Body) -> bool:
     sphere, mesh = (one, other_mesh) if one_mesh is None else (other, one_mesh)
     if sphere is None or mesh is None or not sphere.is_sphere:
         return False
-    return encloses(mesh, sphere.centre) or _distance(mesh, sphere.centre) < sphere.radius * (1 - FLAT)
+    return encloses(mesh, sphere.centre) or distance_to_triangles(mesh.corners, sphere.centre) < sphere.radius * (1 - FLAT)
 
 
 def _common_sphere(first: Bounds, second: Bounds) -> float:
@@ -94,18 +95,6 @@ def _common_sphere(first: Bounds, second: Bounds) -> float:
         bounds=[(None, None)] * 4,
     )
     return -float(largest.fun) if largest.status == 0 else 0.0
-
-
-def _distance(mesh: ClosedMesh, point: Array) -> float:
-    """Return the distance from a point to the triangles of a mesh: to their planes, or to their sides."""
-    corners = mesh.corners - point
-    sides = np.roll(corners, -1, axis=1) - corners
-    normals = np.cross(sides[:, 0], sides[:, 1])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    beside = np.einsum("tsx,tx->ts", np.cross(sides, -corners), normals)  # how far inwards of a side the foot lies
-    planes = np.abs(np.einsum("tx,tx->t", corners[:, 0], normals))[np.all(beside > 0, axis=1)]
-    along = np.clip(-np.sum(corners * sides, axis=2) / np.sum(sides**2, axis=2), 0, 1)
-    return float(min(planes.min(initial=np.inf), np.linalg.norm(corners + along[..., None] * sides, axis=2).min()))
 
 
 def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
