@@ -41,12 +41,12 @@ a plane before a rectangle, 64 points in each of eight replicates leave 4.9e-3 o
 across an edge of the shadow would leave next to nothing, but sections along it are visible as a whole or not at all and
 leave 1/N: hence the axes are turned.
 
-**A sphere** is seen from a point at the distance d from its centre as the disk that its tangents touch, which faces the
-point, a distance of d - R^2/d away, and has the radius R sqrt(1 - R^2/d^2): both fill the same cone of directions, so
-the sections are those of that disk. Azimuths of a disk follow sin(delta) = S sin(g), with g even. The solid angle of the
-cone, 2 pi (1 - sqrt(1 - R^2/d^2)), is the control variate. The disk is within the sphere: what stands before the disk
-stands before the sphere, unless it reaches into the sphere. Then, and where the sphere is seen as a whole, the sample of
-the cone is even and its section so short that it is seen or not.
+**A sphere** is seen from a point at the distance d from its centre as the disk that its tangents touch. The disk faces
+the point at a distance of d - R^2/d and has the radius R sqrt(1 - R^2/d^2). It fills the same cone of directions, so
+its sections are those of the sphere, with azimuths that follow sin(delta) = S sin(g), g even. The solid angle of the
+cone, 2 pi (1 - sqrt(1 - R^2/d^2)), is the control variate. The disk is within the sphere: a shape before the disk is
+before the sphere, unless it reaches into the sphere. Then, and where a point sees the whole sphere, samples are even in
+the cone, and each section is so short that it is seen or not.
 
 **On a mesh** one coordinate of the square chooses a triangle (`reference.quadrature.mesh_choice`), and the rest of the
 coordinate serves within the triangle: along rays as above in one that is near, evenly over its area in others. For

@@ -82,7 +82,8 @@ def _overlap(first: Body, second: Body) -> bool:
     sphere, mesh = (one, other_mesh) if one_mesh is None else (other, one_mesh)
     if sphere is None or mesh is None or not sphere.is_sphere:
         return False
-    return encloses(mesh, sphere.centre) or distance_to_triangles(mesh.corners, sphere.centre) < sphere.radius * (1 - FLAT)
+    apart = distance_to_triangles(mesh.corners, sphere.centre) >= sphere.radius * (1 - FLAT)
+    return not apart or encloses(mesh, sphere.centre)
 
 
 def _common_sphere(first: Bounds, second: Bounds) -> float:

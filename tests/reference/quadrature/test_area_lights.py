@@ -209,9 +209,9 @@ def test_half_a_plane_before_a_rectangle(variant):
 def test_half_a_plane_before_a_sphere(variant):
     """A white floor under a sphere that half a plane covers, by the default plan and by 64 sections, in closed form.
 
-    A floor with the normal n receives Le/2 times the integral of n . (w x dw) around what it sees (Lambert). A circle of
-    half angle a about c, with u and v across, gives sin(a)^2 c dphi - cos(a) sin(a) (cos(phi) u + sin(phi) v) dphi for
-    w x dw, the plane of the edge its normal times the angle.
+    A floor with the normal n receives Le/2 times the integral of n . (w x dw) around what it sees (Lambert). A circle
+    of half angle a about c, with u and v across, has w x dw = (sin(a)^2 c - cos(a) sin(a) (cos(phi) u + sin(phi) v))
+    dphi, and the plane of the edge gives its normal times the angle.
     """
     radius = 0.45
     reference, hits, x, y = beside_an_edge(lamp("sphere", radiance=(1, 1, 1), center=[0, 0, HIGH], radius=radius))
