@@ -14,7 +14,7 @@ recorded functions: one casts and shades, and hands on its hits at no cost; the 
 Casting and shading in two steps whenever something moved would take up to 7 % longer.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,8 +29,6 @@ from realtime.scene.lights import Light, sources_of
 from realtime.scene.media.medium import Medium, Rays
 from realtime.scene.read_scene import Scene
 from realtime.scene.triangle_table import Facets, facet_at, facet_number
-
-_NO_DISTANCE = 1e-12  # what stands for the square of a distance of 0, of which no power is finite [m^2]
 
 
 @dataclass(frozen=True)
@@ -117,33 +115,6 @@ def lit_surface(scene, surface: VisibleSurface, *, medium: Medium, light: Light,
     return dr.select(lit, reflected * kept, type(medium.albedo)(0))
 
 
-def lit_by_points(scene, surface: VisibleSurface, *, medium: Medium, lights: Sequence[Light], depths, shadows: bool):
-    """Return the sum of `lit_surface` over the points of an area light [W/(m^2 sr)].
-
-    Common factors are taken out of the sum: the intensity, the albedo and the transmittance to the eye.
-
-    `scene`, `surface`, `depths`, `shadows`: as for `lit_surface`; `medium`: without bounded media in it; `lights`: the
-    points of one light.
-    """
-
-    def weight(light: Light):
-        toward = light.toward(surface.point)
-        square = dr.maximum(dr.squared_norm(toward), _NO_DISTANCE)
-        inverse = dr.rsqrt(square)
-        facing = dr.maximum(-dr.dot(light.normal, toward), 0) * dr.maximum(dr.dot(surface.normal, toward), 0)
-        r = square * inverse
-        strength = facing * dr.square(dr.square(inverse))
-        if shadows:
-            reached = surface.seen & (strength > 0)
-            reached &= ~scene.ray_test(light.shadow_ray_from(surface.interaction), reached)
-            strength = dr.select(reached, strength, 0)
-        return strength * medium.transmittance(medium.depth_to_light(light, surface.point, r, active=surface.seen))
-
-    total, kept = sum(weight(light) for light in lights), medium.transmittance(depths)
-    reflected = surface.albedo * lights[0].intensity * (dr.inv_pi * kept * total)
-    return dr.select(surface.seen, reflected, type(medium.albedo)(0))
-
-
 def _arriving(light: Light, surface: VisibleSurface):
     """Return the cosine at which a light meets a surface, the distance that it came, and its intensity there.
 
@@ -191,17 +162,9 @@ def surface_stages(
         def lit(number: int):
             return lit_surface(geometry, seen, light=lights[number], shadows=asked[number], **shown)
 
-        def lit_by(source: list[int]):
-            if len(source) == 1:
-                return lit(source[0])
-            if medium.bounded_media:
-                return sum(lit(number) for number in source)
-            points = [lights[number] for number in source]
-            return lit_by_points(geometry, seen, lights=points, shadows=asked[source[0]], **shown)
-
         if provides_visibility and not by_source:
             return tuple(lit(number) for number in range(len(lights)))
-        colors = tuple(lit_by(source) for source in sources)
+        colors = tuple(sum(map(lit, source)) for source in sources)
         return colors if by_source else (sum(colors),)
 
     @Frozen
