@@ -12,11 +12,8 @@
   so that they are right to second order for whatever is smooth. One point is the middle. A sphere has no ring: there
   they lie on a spiral, at equal steps of height and golden angles. Nor has a mesh: there they follow its area in equal
   steps.
-* `grid`: the middles of cells of equal area, in rows of nearly equal numbers.
 * `sobol`: the first points of Sobol's sequence, scrambled as Owen proposed, with one fixed seed (Laine and Karras 2011;
   Burley 2020 has the hash).
-* `interleaved`: the cells of `grid` in an order in which points that follow one another lie far apart: for a method in
-  which neighbouring pixels take different ones. For all others it is `grid`.
 
 **Light samples:** an area light as N point lights of equal power.
 
@@ -35,7 +32,7 @@ from realtime.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
 
-PATTERNS = ("ring", "grid", "sobol", "interleaved")
+PATTERNS = ("ring", "sobol")
 _TURN = 0.37  #: where a ring begins [rad]: not on an axis of the light, along which occluders often run
 _GOLDEN = math.pi * (3 - math.sqrt(5))  #: [rad]
 _SEEDS = (0x1A2B3C4D, 0x9D5F37E1)
@@ -57,38 +54,8 @@ def spiral(points: int) -> Array:
     return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
-def square(pattern: str, points: int) -> Array:
-    """Return points of a pattern other than `ring` in the unit square, (points, 2) in [0, 1]."""
-    if pattern == "sobol":
-        return _sobol(points)
-    cells = _cells(points)
-    return cells if pattern == "grid" else cells[_far_apart(points)]
-
-
-def _cells(points: int) -> Array:
-    """Return the middles of cells of equal area: rows as high as they have cells."""
-    rows = max(1, round(math.sqrt(points)))
-    counts = np.full(rows, points // rows)
-    counts[: points % rows] += 1
-    top = np.cumsum(counts) / points
-    middles = top - 0.5 * counts / points
-    return np.concatenate(
-        [
-            np.stack([(np.arange(count) + 0.5) / count, np.full(count, middle)], axis=1)
-            for count, middle in zip(counts, middles)
-        ]
-    )
-
-
-def _far_apart(points: int) -> NDArray[np.int64]:
-    """Return 0 to points - 1 in the order of van der Corput's sequence."""
-    bits = max(1, (points - 1).bit_length())
-    number = np.arange(2**bits, dtype=np.uint32)
-    order = (bit_reversed(number) >> np.uint32(32 - bits)).astype(np.int64)
-    return order[order < points]
-
-
-def _sobol(points: int) -> Array:
+def sobol(points: int) -> Array:
+    """Return the first points of Sobol's sequence in the unit square, (points, 2) in [0, 1]."""
     index = np.arange(points, dtype=np.uint32)
     first = bit_reversed(index)
     second, direction = np.zeros_like(index), 1 << 31
@@ -126,8 +93,7 @@ class LightSamples(Parameters):
     points: int = parameter(16, "light samples of equal power for each area light", least=1, most=4096)
     pattern: str = parameter(
         "sobol",
-        "where they lie: on a ring, as in Ali 2016; in the middles of a grid; Sobol's sequence; or the grid in the "
-        "order in which neighbouring pixels take them",
+        "where they lie: on a ring, as in Ali 2016, or by Sobol's sequence",
         choices=PATTERNS,
     )
 
@@ -173,7 +139,7 @@ def _on_mesh(light: AreaLight, points: int, pattern: str) -> tuple[Array, Array]
         number = np.arange(points)
         u, v = (number + 0.5) / points, number * _GOLDEN / (2 * math.pi) % 1
     else:
-        u, v = square(pattern, points).T
+        u, v = sobol(points).T
     twice = np.linalg.norm(light.normals, axis=1)
     last = np.cumsum(twice) / twice.sum()
     chosen = np.minimum(np.searchsorted(last, u, side="right"), len(last) - 1)
@@ -187,7 +153,7 @@ def _on_rectangle(points: int, pattern: str) -> tuple[Array, Array]:
     if pattern == "ring":
         u, v = np.sqrt(2 / 3) * ring(points).T
         return u, v
-    u, v = 2 * square(pattern, points).T - 1
+    u, v = 2 * sobol(points).T - 1
     return u, v
 
 
@@ -195,7 +161,7 @@ def _on_disk(points: int, pattern: str) -> tuple[Array, Array]:
     if pattern == "ring":
         u, v = np.sqrt(1 / 2) * ring(points).T
         return u, v
-    return _concentric(square(pattern, points))
+    return _concentric(sobol(points))
 
 
 def _concentric(places: Array) -> tuple[Array, Array]:
@@ -213,7 +179,7 @@ def _on_sphere(light: AreaLight, points: int, pattern: str) -> tuple[Array, Arra
     if pattern == "ring":
         own = spiral(points)
     else:
-        u, v = square(pattern, points).T
+        u, v = sobol(points).T
         z, angle = 1 - 2 * v, 2 * np.pi * u
         across = np.sqrt(1 - z * z)
         own = np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)

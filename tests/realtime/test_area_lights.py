@@ -44,11 +44,10 @@ def test_points_lie_on_the_light_and_share_its_power(kind, pattern, points):
 
 
 @pytest.mark.parametrize("kind", ["rectangle", "disk", "sphere"])
-@pytest.mark.parametrize("pattern", ["grid", "sobol", "interleaved"])
-def test_means_over_many_points_are_those_over_the_light(kind, pattern):
+def test_means_over_many_points_are_those_over_the_light(kind):
     """Second moments: a^2/3 of half a side, R^2/4 of a disk, R^2/3 of a sphere."""
     light = light_of(kind)
-    offsets = (place_points(light, 4096, pattern).positions - light.middle) @ AXES.T
+    offsets = (place_points(light, 4096, "sobol").positions - light.middle) @ AXES.T
     fraction = {"rectangle": 1 / 3, "disk": 1 / 4, "sphere": 1 / 3}[kind]
     sizes = [np.linalg.norm(light.across), np.linalg.norm(light.up)]
     np.testing.assert_allclose(offsets.mean(axis=0), 0, atol=2e-3 * sizes[0])
@@ -65,7 +64,7 @@ def test_a_ring_has_the_second_moments_of_its_light(kind, fraction, points):
     np.testing.assert_allclose(place_points(light, 1, "ring").positions, [light.middle], atol=1e-12)
 
 
-@pytest.mark.parametrize("pattern", ["ring", "sobol", "grid"])
+@pytest.mark.parametrize("pattern", PATTERNS)
 def test_a_sphere_shines_alike_in_all_directions(pattern):
     """The sum of I0 max(0, n . w) is Le pi R^2, what the disk of its outline would send."""
     light = light_of("sphere")

@@ -61,7 +61,7 @@ def test_chosen_methods_bring_their_standard_configurations():
 def test_settings_are_read():
     assert parse_settings(["steps=100", " shadow = map ", "a=b=c"]) == {"steps": "100", "shadow": "map", "a": "b=c"}
     with refused("--set: got points=3 and points=5, expected one of them"):
-        parse_settings(["points=3", "pattern=grid", "points=5"])
+        parse_settings(["points=3", "pattern=ring", "points=5"])
     assert parse_settings(["points=3", " points = 3"]) == {"points": "3"}
 
 
