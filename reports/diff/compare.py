@@ -16,7 +16,7 @@ from reports.diff.times import Finding, TimeComparison, compare_times
 from reports.report.claims import confirmed
 from reports.tables.agreement import verdict
 from reports.tables.costs import TIMES, WORK, same_records
-from reports.tables.table import Column, Table, table, words
+from reports.tables.table import Table, fields_of, table, words
 from validation.metrics.errors import Metrics
 from validation.papers.claims import Claim
 from validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
@@ -25,11 +25,9 @@ _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "
 #: Units of figures that depend on how busy the machine was: another verdict is a note.
 _TIMED = ("frames/s", "ms", "%", "times")
 _COLUMNS = (
-    Column("verdict", "", words=True),
-    *words("scene", "method", "what"),
-    Column("old", "old", digits=4),
-    Column("new", "new", digits=4),
-    Column("change", "change", words=True),
+    *fields_of(Finding, "verdict", "scene", "method", "what"),
+    *fields_of(Finding, "old", "new", digits=4),
+    *words("change"),
 )
 Change = tuple[str, str, float | None, float | None]  # verdict, what, old, new
 _BUSY = 1.25  # with a larger ratio of the quartiles the machine was not quiet
@@ -261,7 +259,7 @@ def _kind(row: Claim, now: Claim) -> str:
 
 def difference_tables(difference: Difference) -> list[Table]:
     """Return the findings that have numbers, the worse ones first."""
-    rows = [_row(finding) for finding in difference.findings if _has_row(finding)]
+    rows = [vars(each) | {"change": _change(each)} for each in difference.findings if _has_row(each)]
     return [table("", _COLUMNS, rows)] if rows else []
 
 
@@ -282,10 +280,6 @@ def difference_lines(difference: Difference) -> list[str]:
 
 def _has_row(finding: Finding) -> bool:
     return bool(finding.old is not None or finding.new is not None or finding.method)
-
-
-def _row(finding: Finding) -> tuple[str | float | None, ...]:
-    return (finding.verdict, finding.scene, finding.method, finding.what, finding.old, finding.new, _change(finding))
 
 
 def _change(finding: Finding) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from reference.storage.exr import Image, write_exr
 from reference.storage.files import ensure_folder, write_text
-from reports.machine.progress import Progress, part_of
+from reports.machine.progress import Progress, sharing
 from reports.plotting.figure import ENDINGS, new_figure, picture_grid, save_figure
 from reports.plotting.pictures import exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS
@@ -35,8 +35,9 @@ def write_figures(folder: Path, paper: str | None, *, quick: bool, progress: Pro
     target = ensure_folder(folder)
     chosen = {name: make for name, (of, make) in _FIGURES.items() if paper is None or paper in of}
     written: list[Path] = []
-    for at, (name, make) in enumerate(chosen.items()):
-        figure = make(quick, part_of(progress, at / len(chosen), (at + 1) / len(chosen), before=f"{name}, "))
+    steps = sharing(progress, [(f"{name}, ", 1.0) for name in chosen])
+    for (name, make), step in zip(chosen.items(), steps):
+        figure = make(quick, step)
         written += [save_figure(target / f"{name}{ending}", figure.draw) for ending in ENDINGS]
         for file, radiance in figure.images.items():
             written.append(target / f"{name}-{file}.exr")
@@ -109,9 +110,9 @@ def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
     scenes = {name: "Fig. 12" for name in RESULTS} | {GAP: "Fig. 11a", LOBES: "Fig. 11b"}
     above, below = [], []
     images: dict[str, Any] = {}
-    for at, (name, figure) in enumerate(scenes.items()):
-        part = part_of(progress, at / len(scenes), (at + 1) / len(scenes), before=f"{name}, ")
-        collectors, paths, _ = pair_of(shown(name, size), samples, part)
+    steps = sharing(progress, [(f"{name}, ", 1.0) for name in scenes])
+    for (name, figure), step in zip(scenes.items(), steps):
+        collectors, paths, _ = pair_of(shown(name, size), samples, step)
         factor = exposure(collectors)
         images |= {f"{name}-collectors": collectors, f"{name}-light-paths": paths}
         above.append((f"{figure}, {name}\ncollectors", tone_mapped(collectors, factor)))

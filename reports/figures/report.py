@@ -5,7 +5,7 @@ They are drawn from report.json and the EXR files beside it, without Mitsuba.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -87,13 +87,6 @@ def draw_speed(scenes: Sequence[Scene], column: str) -> Any:
 # Images with insets: the two squares in which the methods are wrong the most
 
 
-def _measured(scene: Scene, layer: str = "airlight") -> Iterator[MethodRow]:
-    """Yield the methods of a scene that were not refused and whose error is of a layer."""
-    for entry in scene.methods:
-        if not entry.refused and entry.error and entry.layer == layer:
-            yield entry
-
-
 def _strip(report: Report, place: Path, name: str | None, labels: Sequence[str] | None) -> tuple[Any, ...]:
     """Return the scene, the methods to show, and the images of the reference and of each."""
     scene = _scene(report, name)
@@ -133,8 +126,8 @@ def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[MethodRow]:
 
 
 def _shown(scene: Scene, layer: str) -> list[MethodRow]:
-    """Return the methods of a scene that have an image."""
-    return [entry for entry in _measured(scene, layer) if "exr" in entry.files]
+    """Return the methods of a scene that have an image whose error is of a layer."""
+    return [entry for entry in scene.methods if "exr" in entry.files and entry.error and entry.layer == layer]
 
 
 def _rank(entry: MethodRow) -> float:

@@ -207,52 +207,37 @@ def _matrix(axes: Array, position: list[float], turn: Array) -> list[float]:
 
 def _material(surface: dict[str, Any]) -> dict[str, Any]:
     """Return a material that reflects diffusely and nothing else."""
-    return {
-        "name": surface["name"],
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [min(1.0, value) for value in surface["reflectance"]] + [1.0],
-            "metallicFactor": 0.0,
-            "roughnessFactor": 1.0,
-        },
-        "doubleSided": surface["two_sided"],
-        "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
-        "extras": {key: surface[key] for key in ("reflectance", "textured", "diffuse")},
-    }
+    colour = [*(min(1.0, value) for value in surface["reflectance"]), 1.0]
+    extras = {key: surface[key] for key in ("reflectance", "textured", "diffuse")}
+    return _matte(surface["name"], colour, extras) | {"doubleSided": surface["two_sided"]}
 
 
 def _emission(light: dict[str, Any]) -> dict[str, Any]:
     """Return the material of an area light: black, and as bright as the light on the side of its normal."""
     largest = max(light["radiance"])
-    factor = [value / largest for value in light["radiance"]] if largest > 0 else [0.0, 0.0, 0.0]
-    return {
-        "name": f"light {light['name']}",
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
-            "metallicFactor": 0.0,
-            "roughnessFactor": 1.0,
-        },
-        "emissiveFactor": factor,
-        "doubleSided": False,
-        "extensions": {
-            "KHR_materials_specular": {"specularFactor": 0.0},
-            "KHR_materials_emissive_strength": {"emissiveStrength": largest},
-        },
-        "extras": {
-            "light": light,
-            "note": "core glTF has no area light: this mesh emits; to some engines no mesh is a light",
-            "unit": "emissiveStrength is in W/(m^2 sr): no factor of 683 lm/W is in it",
-        },
+    extras = {
+        "light": light,
+        "note": "core glTF has no area light: this mesh emits; to some engines no mesh is a light",
+        "unit": "emissiveStrength is in W/(m^2 sr): no factor of 683 lm/W is in it",
     }
+    made = _matte(f"light {light['name']}", [0.0, 0.0, 0.0, 1.0], extras)
+    made["emissiveFactor"] = [value / largest if largest > 0 else 0.0 for value in light["radiance"]]
+    made["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": largest}
+    return made
 
 
 def _boundary(medium: dict[str, Any]) -> dict[str, Any]:
     """Return a material for the bounds of a medium: nothing is seen of them, what is in them stands in the extras."""
+    return _matte(f"medium {medium['name']}", [1.0, 1.0, 1.0, 0.0], {"medium": medium}) | {"alphaMode": "BLEND"}
+
+
+def _matte(name: str, colour: list[float], extras: dict[str, Any]) -> dict[str, Any]:
+    """Return a material without a gloss, of one side."""
     return {
-        "name": f"medium {medium['name']}",
-        "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, 0.0], "metallicFactor": 0.0},
-        "alphaMode": "BLEND",
+        "name": name,
+        "pbrMetallicRoughness": {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 1.0},
         "extensions": {"KHR_materials_specular": {"specularFactor": 0.0}},
-        "extras": {"medium": medium},
+        "extras": extras,
     }
 
 

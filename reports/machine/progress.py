@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A progress bar with the time left, on the error stream; plain lines where that is no terminal."""
 
+import itertools
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 Progress = Callable[[float, str], None]
@@ -11,6 +12,7 @@ Steps = Callable[[int, int, str], None]  # (done, total, what)
 
 _PATIENCE = 2.0  # seconds before anything is shown
 _PLAIN_EVERY = 10.0  # seconds between the lines of a plain stream
+_LEAST = 0.01  # of a part, to read a cached result [s]
 
 
 @contextmanager
@@ -90,6 +92,16 @@ def part_of(progress: Progress | None, first: float, last: float, *, before: str
         return lambda fraction, what: None
     # This form, unlike first + fraction (last - first), gives both ends exactly.
     return lambda fraction, what: progress((1 - fraction) * first + fraction * last, before + what)
+
+
+def sharing(progress: Progress | None, parts: Iterable[tuple[str, float]]) -> list[Progress]:
+    """Return the callback for each part of some work: of a part the words before its own, and how long it will take."""
+    named = [(words, max(_LEAST, seconds)) for words, seconds in parts]
+    ends = [0.0, *itertools.accumulate(seconds for _, seconds in named)]
+    return [
+        part_of(progress, first / ends[-1], last / ends[-1], before=words)
+        for (words, _), (first, last) in zip(named, itertools.pairwise(ends))
+    ]
 
 
 def counted(progress: Progress | None) -> Steps:

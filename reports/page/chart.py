@@ -3,37 +3,18 @@
 
 import io
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
 from reports.data.records import Scene
 from reports.plotting.figure import has_point, legend_below, new_figure, speed_chart, speed_panel
-from reports.plotting.style import report_styles
+from reports.plotting.style import page_style, report_styles
 
 _SIZE = {"markersize": 7}
 
 
-@contextmanager
-def _style() -> Iterator[None]:
-    """Use the style of charts on the page for a block."""
-    import matplotlib
-
-    with matplotlib.rc_context(
-        {
-            "font.size": 9,
-            "legend.fontsize": 8,
-            "legend.frameon": False,
-            "axes.grid": True,
-            "grid.linewidth": 0.4,
-            "grid.alpha": 0.5,
-        }
-    ):
-        yield
-
-
-@_style()
+@page_style()
 def speed_error_chart(scenes: Sequence[Scene]) -> str:
     """Return speed against error of all scenes as inline SVG; nothing where nothing was timed."""
     if not any(has_point(entry) for scene in scenes for entry in scene.methods):
@@ -41,7 +22,7 @@ def speed_error_chart(scenes: Sequence[Scene]) -> str:
     return svg_text(speed_chart(scenes, 5.1 * min(2, len(scenes)), across=2, tallest=3.5, **_SIZE))
 
 
-@_style()
+@page_style()
 def scene_chart(scenes: Sequence[Scene], place: int) -> str:
     """Return speed against error in one of the scenes as inline SVG, in the styles of the whole report.
 

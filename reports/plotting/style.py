@@ -120,6 +120,15 @@ def figure_style(column: str = "double") -> Iterator[float]:
         yield WIDTHS[column]
 
 
+@contextmanager
+def page_style() -> Iterator[None]:
+    """Use the style sheet of charts on a page for a block."""
+    import matplotlib.style
+
+    with matplotlib.style.context(_SHEETS / "page.mplstyle"):
+        yield
+
+
 def _marker_style(colour: str, marker: str, variant: int) -> dict[str, Any]:
     second_round = (variant // len(_FILLS)) % 2
     return {

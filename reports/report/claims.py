@@ -13,7 +13,7 @@ The kinds of claims:
     not-measured   what was left out for its time, HDR-FLIP that could not be computed
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from realtime.methods.shader.source import is_users
 from reports.data.records import Claim, MethodRow, Scene
@@ -24,7 +24,6 @@ from validation.statistics.records import Agreement
 from validation.timing import Scaling
 
 Scenes = Sequence[Scene]
-Entries = Sequence[tuple[str, MethodRow]]  #: with the names of their scenes
 
 _WORDS = {"volpath": "Mitsuba's volpath", "single-scatter": "our own Mitsuba integrator"}
 
@@ -34,10 +33,11 @@ def claims(scenes: Scenes) -> list[Claim]:
     if not scenes:
         return []
     sentences = [*_trust(scenes), _left_out(scenes), *_images(scenes), *_failed(scenes)]
-    refused = [m for m in _methods(scenes) if m[1].refused]
-    sentences += _listed("refused", "Refused, with the reason in the tables", refused, lambda m: not m.left_out)
-    slow = "Not measured for the time that they take, with the reason in the tables"
-    sentences += _listed("not-measured", slow, refused, lambda m: m.left_out)
+    slow = "Not measured for the time that they take"
+    for kind, words, left_out in (("refused", "Refused", False), ("not-measured", slow, True)):
+        named = [f"{m.label} in {name}" for name, m in _entries(scenes) if m.refused and m.left_out == left_out]
+        if named:
+            sentences.append(_claim(kind, f"{words}, with the reason in the tables: {'; '.join(named)}."))
     return sentences + _without_flip(scenes)
 
 
@@ -79,10 +79,10 @@ def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
     return Claim(kind=kind, text=text, good=good)
 
 
-def _methods(scenes: Scenes, *, images: bool = False) -> list[tuple[str, MethodRow]]:
-    """Return the scene's name with every entry of a method, or with every image of an engine."""
+def _entries(scenes: Scenes) -> list[tuple[str, MethodRow]]:
+    """Return the scene's name with every entry: those of methods, then the images of engines."""
     entries = [(scene.name, entry) for scene in scenes for entry in scene.methods]
-    return [(name, entry) for name, entry in entries if (entry.kind == "image") == images]
+    return sorted(entries, key=lambda pair: pair[1].kind == "image")
 
 
 def _trust(scenes: Scenes) -> list[Claim]:
@@ -134,9 +134,9 @@ def _left_out(scenes: Scenes) -> Claim:
 
 
 def _images(scenes: Scenes) -> Iterator[Claim]:
-    for scene, entry in _methods(scenes, images=True):
+    for scene, entry in _entries(scenes):
         error = entry.error
-        if not error or error.relative_rmse is None:
+        if entry.kind != "image" or not error or error.relative_rmse is None:
             continue
         what = "total of airlight and surface" if entry.layer == "total" else entry.layer
         text = (
@@ -147,9 +147,8 @@ def _images(scenes: Scenes) -> Iterator[Claim]:
 
 
 def _failed(scenes: Scenes) -> Iterator[Claim]:
-    everything = _methods(scenes) + _methods(scenes, images=True)
     for count, words in (("nonfinite", "values that are not finite"), ("negative", "negative values")):
-        wrong = [(name, m) for name, m in everything if _count(m, count)]
+        wrong = [(name, m) for name, m in _entries(scenes) if getattr(m.error, count, 0)]
         failed = [_pixels(name, m, count) for name, m in wrong if not published_as(m)]
         if failed:
             yield _claim("failed", f"Images with {words}: {'; '.join(failed)}.", False)
@@ -163,23 +162,13 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
 
 
 def _pixels(scene: str, m: MethodRow, count: str) -> str:
-    pixels = _count(m, count)
+    pixels = getattr(m.error, count)
     return f"{m.label} in {scene} ({pixels} pixel{'' if pixels == 1 else 's'})"
-
-
-def _count(m: MethodRow, name: str) -> int:
-    return getattr(m.error, name, 0)
-
-
-def _listed(kind: str, words: str, entries: Entries, wanted: Callable[[MethodRow], bool]) -> list[Claim]:
-    names = [f"{m.label} in {name}" for name, m in entries if wanted(m)]
-    return [_claim(kind, f"{words}: {'; '.join(names)}.")] if names else []
 
 
 def _without_flip(scenes: Scenes) -> list[Claim]:
     """Return a claim on the images that have no HDR-FLIP, with the reason of the first."""
-    everything = _methods(scenes) + _methods(scenes, images=True)
-    without = [(name, m.label, m.flip.note) for name, m in everything if m.flip and m.flip.value is None]
+    without = [(name, m.label, m.flip.note) for name, m in _entries(scenes) if m.flip and m.flip.value is None]
     if not without:
         return []
     name, label, why = without[0]

@@ -27,10 +27,10 @@ from reports.data.records import SCHEMA, Environment, Measured, Report, Settings
 from reports.machine.environment import describe_environment, machine, threads
 from reports.machine.opengl import require_opengl
 from reports.machine.own_process import EndedError, in_own_process
-from reports.machine.progress import Progress, part_of
+from reports.machine.progress import Progress, sharing
 from reports.page.render import render_page
 from reports.report.claims import claims, growth_claims, own_fault, unstudied
-from reports.report.others import other_parts, paper_rows, spans_of
+from reports.report.others import other_parts, paper_rows
 from reports.report.scene import folder_of, write_scene
 from validation.columns import record_of
 from validation.scenes.loading import scene_stem
@@ -81,17 +81,16 @@ def write_report(
     if any(is_shader(chosen.method) for chosen in study.configurations):
         environment["opengl"] = require_opengl()
     process = in_own_process if apart else None
-    seconds = dict.fromkeys(("scenes", "stability", "scaling", "papers"), 0.0)
     since, notes, of_scenes, referenced = time.time() if fresh else None, list[str](), [], list[Cell]()
 
     def opened(name: str) -> SceneStudy:
         return open_scene(name, study.of(name).at(sizes.get(scene_stem(name))), machine())
 
-    with _timed(seconds, "scenes"), fresh_results(since):
+    with fresh_results(since):
         for name in names:
             each = opened(name)
             notes += each.scene.features.notes
-            of_scenes.append(each.seconds())
+            of_scenes.append((f"{each.name}: ", each.seconds()))
             if cluster is not None:
                 from reports.cluster.references import image_of
 
@@ -101,52 +100,53 @@ def write_report(
     target = ensure_folder(folder)
     with fresh_results(since), staged(target) as hidden:
         others = other_parts(study)
-        whole = [sum(parts.values()) for parts in of_scenes] + [part.seconds for part in others]
-        spans = list(spans_of({str(n): each for n, each in enumerate([*whole, _PAGE_SECONDS * len(names)])}).values())
+        whole = [(words, sum(parts.values())) for words, parts in of_scenes]
+        whole += [(f"{part.title}, ", part.seconds) for part in others]
+        *steps, page = sharing(progress, [*whole, ("", _PAGE_SECONDS * len(names))])
         studied, results = [], list[Kept[Any]]()
-        with _timed(seconds, "scenes"):
-            if cluster is not None:
-                from reports.cluster.references import bring_references
+        if cluster is not None:
+            from reports.cluster.references import bring_references
 
-                bring_references(cluster, referenced, points=study.points)
-            ended = _try_own(names[0], study, process) if names else {}
-            for name, parts, span in zip(names, of_scenes, spans):
-                # One scene at a time: Mitsuba compiles a virtual call for the materials, media and lights of all scenes
-                # that are loaded. A batch of volpath takes eight times as long with ten others.
-                gc.collect()
-                each = opened(name)
-                step = part_of(progress, *span, before=f"{each.name}: ")
-                begins = {part: first for part, (first, _) in spans_of(parts).items()}
-                result = study_scene(
-                    each,
-                    images=shown.get(scene_stem(each.path), ()),
-                    apart=process,
-                    ended=ended,
-                    progress=lambda part, step=step, begins=begins: step(begins[part], part),  # type: ignore[misc]
-                    spread=_spread(cluster, each),
-                    workers=threads(),
-                )
-                _raise_own_faults(result.rows, process)
-                results += result.results
-                studied.append(write_scene(result, hidden))
-                del each, result
+            bring_references(cluster, referenced, points=study.points)
+        ended = _try_own(names[0], study, process) if names else {}
+        for name, (_, parts), step in zip(names, of_scenes, steps):
+            # One scene at a time: Mitsuba compiles a virtual call for the materials, media and lights of all scenes
+            # that are loaded. A batch of volpath takes eight times as long with ten others.
             gc.collect()
+            each = opened(name)
+            begun = dict(zip(parts, sharing(step, parts.items())))
+            result = study_scene(
+                each,
+                images=shown.get(scene_stem(each.path), ()),
+                apart=process,
+                ended=ended,
+                progress=lambda part, begun=begun: begun[part](0.0, ""),  # type: ignore[misc]
+                spread=_spread(cluster, each),
+                workers=threads(),
+            )
+            _raise_own_faults(result.rows, process)
+            results += result.results
+            studied.append(write_scene(result, hidden))
+            del each, result
+        gc.collect()
         by_kind: dict[str, list[Any]] = {}
-        for part, span in zip(others, spans[len(names) :]):
-            with _timed(seconds, part.kind):
-                found = part.result(part_of(progress, *span, before=f"{part.title}, "))
+        seconds = {"scenes": time.monotonic() - start, "stability": 0.0, "scaling": 0.0, "papers": 0.0}
+        for part, step in zip(others, steps[len(names) :]):
+            begin = time.monotonic()
+            found = part.result(step)
+            seconds[part.kind] += time.monotonic() - begin
             by_kind.setdefault(part.kind, []).append(found.value)
             results.append(found)
         scaling = [each for found in by_kind.get("scaling", ()) for each in found]
         usual = study.name in STUDIES and names == standard_study(study.name).scenes
         kernels = [each for found in by_kind.get("stability", ()) for each in found]
-        kept, made = sum(result.loaded for result in results), sorted(result.made for result in results)
+        kept, made = sum(found.loaded for found in results), sorted(found.made for found in results)
         report = Report(
             schema=SCHEMA,
             created=date(),
             command=command,
             seconds=round(time.monotonic() - start, 1),
-            parts=seconds,
+            parts={kind: round(taken, 2) for kind, taken in seconds.items()},
             cached=kept,
             computed=len(results) - kept,
             measured=Measured(first=date(made[0]), last=date(made[-1])) if made else None,
@@ -158,7 +158,6 @@ def write_report(
             scaling=tuple(scaling),
             papers=tuple(paper_rows(by_kind.get("papers", ()))),
         )
-        page = part_of(progress, *spans[-1])
         page(0.0, "the page")
         (hidden / "report.json").write_text(report_text(report), encoding="utf-8", newline="\n")
         (hidden / "report.html").write_text(render_page(report, hidden), encoding="utf-8", newline="\n")
@@ -182,14 +181,6 @@ def settings(study: Study) -> Settings:
         "scaling": study.growth,
     }
     return record_of(asked, Settings)
-
-
-@contextmanager
-def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
-    """Add the time that a block takes to that of a part [s]."""
-    start = time.monotonic()
-    yield
-    seconds[part] = round(seconds[part] + time.monotonic() - start, 2)
 
 
 def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None":

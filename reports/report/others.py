@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parts of a report that belong to no scene of it: the stability of kernels, how times grow, claims of papers."""
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ from realtime.methods.shader.source import is_users
 from reference.storage.kept import Kept, KeptFunction, kept, source_digest
 from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
-from reports.machine.progress import Progress, counted, part_of
+from reports.machine.progress import Progress, counted, sharing
 from validation.kernels.records import Stability
 from validation.papers.claims import EFFORTS, Claim, claims, experiments, judged
 from validation.study.configuration import Configuration, user_code
@@ -20,7 +19,6 @@ from validation.study.study import Study, standard_study
 from validation.timing import Scaling
 
 _STABILITY, _GROWTH = 20.0, 80.0  # that these take [s]
-_LEAST = 0.01  # to read a kept result [s]
 
 
 @dataclass(frozen=True)
@@ -57,14 +55,6 @@ def other_parts(study: Study) -> list[OtherPart]:
     if study.name in EFFORTS and set(standard_study(study.name).scenes) <= set(study.scenes):
         parts += [_paper(name) for name in experiments_of(claims(), study.name)]
     return parts
-
-
-def spans_of(seconds: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return where each part begins and ends, as fractions of the time that all of them take in turn."""
-    spent = [max(_LEAST, value) for value in seconds.values()]
-    total = sum(spent)
-    bounds = [sum(spent[:number]) / total for number in range(len(spent))] + [1.0]
-    return dict(zip(seconds, itertools.pairwise(bounds)))
 
 
 # --- kernels ---------------------------------------------------------------------------------------------------------
@@ -148,9 +138,6 @@ def decided(chosen: Sequence[Claim], figures: Mapping[str, Mapping[str, Any]]) -
 
 def measure_claims(chosen: Sequence[Claim], *, quick: bool = False, progress: Progress | None = None) -> list[Claim]:
     """Measure what claims need and is not cached, and return those that are decided; `quick` leaves out images."""
-    parts = {name: _paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])}
-    steps = spans_of({name: part.seconds for name, part in parts.items()})
-    figures = {
-        name: part.result(part_of(progress, *steps[name], before=f"{name}, ")).value[1] for name, part in parts.items()
-    }
-    return decided(chosen, figures)
+    parts = [_paper(name) for name in experiments_of(chosen, "quick" if quick else EFFORTS[-1])]
+    steps = sharing(progress, [(f"{part.title}, ", part.seconds) for part in parts])
+    return decided(chosen, dict(part.result(step).value for part, step in zip(parts, steps)))

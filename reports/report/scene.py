@@ -31,12 +31,13 @@ _REFERENCE = "reference"  # the stem of the reference's files
 def write_scene(result: SceneResult, folder: Path) -> Scene:
     """Return the record of a scene, and write its files into a folder of the report's."""
     study, reference = result.study, result.reference
-    files = _Files(folder, folder_of(study.path))
+    own = folder_of(study.path)
+    (folder / own).mkdir(exist_ok=True)
     light = reference.airlight + reference.surface
     factor = exposure(light)
     pictures = {"picture": tone_mapped(light, factor), "airlight": tone_mapped(reference.airlight, factor)}
-    named = files.written(_REFERENCE, layered_reference(study.loaded, reference), pictures)
-    stems = file_stems([judged.row.label for judged in result.rows])
+    named = _written(folder, f"{own}/{_REFERENCE}", layered_reference(study.loaded, reference), pictures)
+    stems = [f"{own}/{stem}" for stem in file_stems([judged.row.label for judged in result.rows])]
     return Scene(
         name=study.name,
         purpose=study.loaded.purpose,
@@ -51,18 +52,18 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
         agreement=result.agreement,
         multiple=result.multiple,
         files=SceneFiles(**named),
-        methods=tuple(_entry(judged, files, stem, factor) for judged, stem in zip(result.rows, stems, strict=True)),
+        methods=tuple(_entry(judged, folder, stem, factor) for judged, stem in zip(result.rows, stems, strict=True)),
         seconds=result.seconds,
     )
 
 
-def _entry(judged: Judged, files: "_Files", stem: str, factor: float) -> Method:
+def _entry(judged: Judged, report: Path, stem: str, factor: float) -> Method:
     """Return the record of a row, with its files written."""
     row, named = judged.row, dict[str, str]()
     if judged.image is not None and judged.expected is not None:
         test = np.asarray(judged.image.layers[row.layer], dtype=np.float64)
         pictures = {"picture": tone_mapped(judged.light, factor), "error": error_map(judged.expected, test)}
-        named = files.written(stem, judged.image, pictures)
+        named = _written(report, stem, judged.image, pictures)
     return Method(
         **vars(row_record(row, named)),
         measured=judged.results[0].measured,
@@ -88,20 +89,13 @@ def reference_record(reference: ReferenceImage) -> Reference:
     return record_of(found, Reference)
 
 
-class _Files:
-    """The files of a scene, in a folder of the report's."""
-
-    def __init__(self, report: Path, name: str) -> None:
-        self._report, self._name = report, name
-        (report / name).mkdir(exist_ok=True)
-
-    def written(self, stem: str, image: Image, pictures: Mapping[str, Any]) -> dict[str, str]:
-        """Write an image and its pictures, and return the names of the files in the report by what they are."""
-        names = {kind: f"{self._name}/{stem}{SUFFIXES[kind]}" for kind in ("exr", *pictures)}
-        write_exr(self._report / names["exr"], stamped(image), finite=False)  # somebody's, which the report judges
-        for kind, pixels in pictures.items():
-            (self._report / names[kind]).write_bytes(png_bytes(pixels))
-        return names
+def _written(report: Path, stem: str, image: Image, pictures: Mapping[str, Any]) -> dict[str, str]:
+    """Write an image and its pictures into a folder of the report; return the names of the files by what they are."""
+    names = {kind: f"{stem}{SUFFIXES[kind]}" for kind in ("exr", *pictures)}
+    write_exr(report / names["exr"], stamped(image), finite=False)  # somebody's, which the report judges
+    for kind, pixels in pictures.items():
+        (report / names[kind]).write_bytes(png_bytes(pixels))
+    return names
 
 
 def folder_of(name_or_path: str) -> str:

@@ -8,6 +8,5 @@ Read in this order:
 - `faults.py`: refusals, what is wrong whatever the error, the worst scenes
 - `summary.py`: all of these, worked out once
 - `tables.py`: tables of them
-- `figures.py`: figures of them
-- `page.py`: the page, and all files
+- `page.py`: the page, its figures, and all files
 """

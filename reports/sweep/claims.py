@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reports.sweep.samples import FAULTS, UNTOLD, Numbers, Sample, Sweep
+from reports.sweep.samples import FAULTS, UNTOLD, Sample, Sweep
 from validation.properties.properties import PROPERTIES
 from validation.statistics.samples import LEVEL, binomial_interval, rank_correlation
 
@@ -79,9 +79,9 @@ def claim(sample: Sample, target: float, level: float = LEVEL) -> Claim:
     return replace(made, text=f"{sample.label}: {words}.")
 
 
-def claims(made: Sequence[Sample], targets: Sequence[float] = TARGETS) -> list[Claim]:
+def claims(made: Sequence[Sample]) -> list[Claim]:
     """Return the claims of every configuration, one for each error."""
-    return [claim(sample, target) for sample in made for target in targets]
+    return [claim(sample, target) for sample in made for target in TARGETS]
 
 
 def best_claims(made: Sequence[Claim], target: float) -> list[Claim]:
@@ -130,11 +130,8 @@ class Correlation:
     high: float
 
 
-def correlations(sweep: Sweep, made: Sequence[Sample], level: float = LEVEL) -> list[Correlation]:
-    """Return the correlation of every property that varies with the error of every configuration.
-
-    All intervals hold what they estimate with the probability `level` [1].
-    """
+def correlations(sweep: Sweep, made: Sequence[Sample]) -> list[Correlation]:
+    """Return the correlation of every property that varies with the error of every configuration."""
     pairs = []
     for sample in made:
         usable = sample.measured & ~np.isnan(sample.errors)
@@ -144,7 +141,7 @@ def correlations(sweep: Sweep, made: Sequence[Sample], level: float = LEVEL) -> 
             x, y = values[both], sample.errors[both]
             if len(x) >= LEAST and np.ptp(x) > 0 and len(np.unique(y)) > 1:
                 pairs.append((sample, name, x, y))
-    each = 1 - (1 - level) / max(len(pairs), 1)
+    each = 1 - (1 - LEVEL) / max(len(pairs), 1)
     return [Correlation(sample.label, name, len(x), *rank_correlation(x, y, each)) for sample, name, x, y in pairs]
 
 
@@ -153,27 +150,23 @@ def sure(found: Correlation) -> bool:
     return found.low > 0 or found.high < 0
 
 
-def strongest(found: Sequence[Correlation], sweep: Sweep, sample: Sample, count: int = NAMED) -> list[Correlation]:
+def strongest(found: Sequence[Correlation], sweep: Sweep, sample: Sample) -> list[Correlation]:
     """Return the properties that go with the error of a configuration most, without any that say nearly the same.
 
-    `found` comes from `correlations`; there are `count` at most.
+    `found` comes from `correlations`.
     """
     own = [each for each in found if each.label == sample.label and sure(each)]
     chosen: list[Correlation] = []
     for each in sorted(own, key=lambda each: (-abs(each.r), each.property)):
-        if len(chosen) < count and all(not _same(sweep, sample, each.property, other.property) for other in chosen):
+        if len(chosen) < NAMED and all(not _same(sweep, sample, each.property, other.property) for other in chosen):
             chosen.append(each)
     return chosen
 
 
 def _same(sweep: Sweep, sample: Sample, first: str, second: str) -> bool:
-    x, y = (_of(sweep, sample, name) for name in (first, second))
+    x, y = (sweep.property(name)[list(sample.rows)] for name in (first, second))
     both = np.isfinite(x) & np.isfinite(y)
     return abs(rank_correlation(x[both], y[both])[0]) > SAME
-
-
-def _of(sweep: Sweep, sample: Sample, name: str) -> Numbers:
-    return sweep.property(name)[list(sample.rows)]
 
 
 def property_words(name: str) -> str:

@@ -64,8 +64,9 @@ class Check:
     meaning: str = column("which means")
 
 
-def reasons(sweep: Sweep, statuses: Sequence[str] = ("refused", *FAULTS)) -> list[Reason]:
+def reasons(sweep: Sweep) -> list[Reason]:
     """Return why cells have no numbers, each reason once, the most frequent first."""
+    statuses = ["refused", *FAULTS]
     groups: dict[tuple[str, str], list[int]] = {}
     texts, status, scenes = sweep.texts("reason"), sweep.texts("status"), sweep.texts("scene")
     for row in np.flatnonzero(np.isin(status.astype(str), statuses)).tolist():
@@ -132,11 +133,11 @@ class Worst:
     command: str
 
 
-def worst(sweep: Sweep, sample: Sample, properties: Sequence[str], count: int = COUNT) -> list[Worst]:
+def worst(sweep: Sweep, sample: Sample, properties: Sequence[str]) -> list[Worst]:
     """Return the worst scenes of a configuration, the worst first, with some of their properties."""
     errors = np.where(np.isnan(sample.errors), -np.inf, sample.errors)
     order = np.lexsort((-errors, -sample.nonfinite.astype(bool).astype(float)))
-    places = [place for place in order if sample.measured[place]][:count]
+    places = [place for place in order if sample.measured[place]][:COUNT]
 
     def known(column: str, row: int) -> float | None:
         value = float(sweep.numbers(column)[row])

@@ -1,32 +1,47 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The files that say what a sweep says, made from its Parquet alone: its page, its figures and its claims.
 
-The page is one HTML file that needs no network.
+The page is one HTML file that needs no network. A sweep has a thousand scenes and a dozen configurations or more: no
+panel tells a dozen colours apart, so every configuration has a line of the figure.
 """
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from reference.storage.files import ensure_folder, write_bytes, write_text
 from reports import __version__
 from reports.page.chart import svg_text
 from reports.page.filters import drawn, facts, percent, unbroken
 from reports.page.render import page_environment, template_text
-from reports.plotting.figure import file_bytes
+from reports.plotting.figure import file_bytes, legend_below, new_figure, plain_times, short
+from reports.plotting.style import report_styles
 from reports.sweep import tables
 from reports.sweep.claims import LEAST, NAMED, SAME, TARGETS, property_words
-from reports.sweep.figures import drawn as drawn_figures
-from reports.sweep.samples import read_sweep
+from reports.sweep.samples import Numbers, Sample, read_sweep
 from reports.sweep.summary import Summary, sound_words, summary_of
 from validation.columns import plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PAGE, CLAIMS, FIGURES = "sweep.html", "sweep.json", "figures"  #: in the folder of a sweep
 PICTURES = 400  #: most on a page, of some 20 kB each
 
 _TABLES = ("errors", "speed", "correlations", "refusals", "checks", "faults")
+
+_WIDTH = 10.2  #: of a figure [inches]; the page scales it
+_EXACT = 1e-8  #: errors below are drawn here: float32 cannot tell them from none
+_WRONG = 1e3  #: errors above are drawn here: a series that left its range has 1e22, and no other point could be told
+_LABEL = 38  # letters of a label, which may be a path of a user's: room is left for the panel
+_DOTS = 160  #: dots per inch of what is drawn as pixels, thousands of points that would be megabytes as shapes
+
+ERROR = "relative RMSE of the airlight [1]"
+TIME = "time of a frame [ms]"
 
 
 def write_sweep(source: Path, target: Path | None = None) -> tuple[Summary, Path]:
@@ -96,3 +111,93 @@ def _pictures(said: Summary, keys: list[str]) -> dict[str, str]:
     """Return pictures of rows as addresses that hold them, by key."""
     kept: dict[str, Any] = said.sweep.pictures(keys)
     return {key: f"data:image/webp;base64,{base64.b64encode(kept[key]).decode()}" for key in keys if key in kept}
+
+
+# Figures: for the page as SVG, for papers as PDF
+
+
+def distribution(said: Summary) -> "Figure | None":
+    """Return how the errors of each configuration are spread over the scenes: a line each, the best above.
+
+    None if nothing was measured.
+    """
+    shown = [sample for sample in said.samples if _errors(sample).size]
+    if not shown:
+        return None
+    shown.sort(key=lambda sample: float(np.median(_errors(sample))))
+    figure = _figure(0.26 * len(shown) + 1.0)
+    panel = figure.subplots()
+    styles = report_styles(said.samples)
+    for place, sample in enumerate(shown):
+        errors, colour = _errors(sample), styles[sample.label]["color"]
+        low, first, middle, third, high = np.quantile(errors, (0.05, 0.25, 0.5, 0.75, 0.95), method="nearest")
+        outside = errors[(errors < low) | (errors > high)]
+        panel.plot(outside, np.full(len(outside), place), "|", color=colour, markersize=5, alpha=0.5, rasterized=True)
+        panel.plot((low, high), (place, place), color=colour, linewidth=1.2)
+        panel.plot((first, third), (place, place), color=colour, linewidth=7, alpha=0.55, solid_capstyle="butt")
+        panel.plot(middle, place, "|", color="black", markersize=9, markeredgewidth=1.6)
+    for target in TARGETS:
+        panel.axvline(target, color="#666a72", linewidth=0.8, linestyle=":", zorder=0)
+    panel.set_yticks(range(len(shown)), [_with_count(sample) for sample in shown], parse_math=False)
+    panel.set(xscale="log", xlabel=ERROR, ylim=(len(shown) - 0.4, -0.6))
+    panel.grid(True, axis="x", which="major", linewidth=0.4, alpha=0.5)
+    panel.spines[["top", "right", "left"]].set_visible(False)
+    panel.tick_params(axis="y", length=0)
+    return figure
+
+
+def medians(said: Summary) -> "Figure | None":
+    """Return speed against error, each configuration as its median and its quartiles over the scenes.
+
+    None if nothing was timed with the machine to itself.
+    """
+    shown = [sample for sample in said.samples if _points(sample)[0].size]
+    if not shown:
+        return None
+    figure = _figure(4.0 + 0.16 * -(-len(shown) // 3))
+    panel = figure.subplots()
+    styles = report_styles(said.samples)
+    for sample in shown:
+        times, errors = _points(sample)
+        (x0, x, x1), (y0, y, y1) = (np.quantile(each, (0.25, 0.5, 0.75), method="nearest") for each in (times, errors))
+        style = styles[sample.label] | {"linestyle": "none", "markersize": 8}
+        panel.errorbar(x, y, xerr=[[x - x0], [x1 - x]], yerr=[[y - y0], [y1 - y]], elinewidth=0.8, **style)
+    panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
+    plain_times(panel)
+    panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
+    legend_below(
+        figure, panel, {each.label: styles[each.label] for each in shown}, columns=3, fontsize=8, frameon=False
+    )
+    return figure
+
+
+def drawn_figures(said: Summary) -> Iterator[tuple[str, "Figure"]]:
+    """Yield the figures that the sweep has data for, with the names of their files and their places on the page."""
+    for name, draw in (("sweep-errors", distribution), ("sweep-medians", medians)):
+        figure = draw(said)
+        if figure is not None:
+            yield name, figure
+
+
+def _figure(height: float) -> "Figure":
+    figure = new_figure(_WIDTH, height)
+    figure.set_dpi(_DOTS)
+    return figure
+
+
+def _errors(sample: Sample) -> Numbers:
+    """Return the finite errors of a configuration, within what is drawn."""
+    return np.clip(sample.errors[np.isfinite(sample.errors)], _EXACT, _WRONG)
+
+
+def _points(sample: Sample) -> tuple[Numbers, Numbers]:
+    """Return times and errors of the scenes that have both."""
+    both = np.isfinite(sample.times) & np.isfinite(sample.errors)
+    return sample.times[both], np.clip(sample.errors[both], _EXACT, _WRONG)
+
+
+def _with_count(sample: Sample) -> str:
+    """Return the name of a configuration, and how many of its scenes have no place in the figure."""
+    away = {"refused": sample.count("refused"), "infinite": int(np.isinf(sample.errors).sum())}
+    words = ", ".join(f"{count} {what}" for what, count in away.items() if count)
+    return f"{short(sample.label, _LABEL)}{f' [{words}]' if words else ''}"

@@ -154,7 +154,6 @@ def yield_processor() -> None:
 
 def answers(task: Task) -> Iterator[Answer]:
     """Yield the reference of an image, rays after rays."""
-    from reports.view.reference import pixel_order
     from validation.estimates.quadrature import reference_error, reference_of_pixels
     from validation.scenes.loading import load_scene
 

@@ -9,8 +9,7 @@ import pytest
 
 from reports.commands.main import run
 from reports.page.chart import svg_text
-from reports.sweep.figures import drawn
-from reports.sweep.page import render_sweep, write_sweep
+from reports.sweep.page import drawn_figures, render_sweep, write_sweep
 from reports.sweep.samples import FILE, read_sweep
 from reports.sweep.summary import summary_of
 from tests.helpers.page import Page
@@ -29,7 +28,7 @@ def said(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def charts(said):
-    return {name: svg_text(figure, name) for name, figure in islice(drawn(said), 1)}
+    return {name: svg_text(figure, name) for name, figure in islice(drawn_figures(said), 1)}
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +66,7 @@ def test_page_keeps_the_pictures_of_the_worst(said, charts, monkeypatch):
 )
 def test_sweeps_at_the_edges_have_their_page(tmp_path, several):
     said = said_of(tmp_path, several)
-    text = Page(render_sweep(said, {name: svg_text(figure, name) for name, figure in drawn(said)})).text
+    text = Page(render_sweep(said, {name: svg_text(figure, name) for name, figure in drawn_figures(said)})).text
     assert "None" not in text
     assert "nan" not in re.findall(r"\b\w+\b", text)
     assert "inf" not in re.findall(r"\b\w+\b", text)
@@ -79,7 +78,7 @@ def test_names_and_reasons_are_words_and_never_html(tmp_path):
     several = [row(f"random:{n}", method=evil, property_depth=float(n), relative_rmse=0.1 * n) for n in range(1, 15)]
     several.append(row("random:15", method="min-max", status="refused", reason=evil, command=evil))
     made = said_of(tmp_path, several)
-    figures = {name: svg_text(figure, name) for name, figure in islice(drawn(made), 1)}
+    figures = {name: svg_text(figure, name) for name, figure in islice(drawn_figures(made), 1)}
     page = Page(render_sweep(made, figures))
     assert not page.scripts
     assert page.text.count("alert('N')") == 1
