@@ -30,15 +30,16 @@ class OpenScene(LoadedScene):
         return dict(_described(self)[0])
 
     def _repr_html_(self) -> str:
-        from reports.tables.record import block, facts_table, paragraph
+        from reports.page.filters import facts
+        from reports.tables.drawing import html
+        from reports.tables.record import block, paragraph
 
         try:
             words, notes = _described(self)
         except InputError as reason:
             words, notes = {"refused": str(reason)}, ()
-        rows = [("size", "{} x {}".format(*self.size)), *words.items()]
-        rows += [("answers to", self.published)] if self.published else []
-        return block(self.name, paragraph(" ".join([self.purpose, *notes])), facts_table(rows))
+        known = {"size": self.size, **words, "answers to": self.published or None}
+        return block(self.name, paragraph(" ".join([self.purpose, *notes])), html(facts("", known)))
 
     def __repr__(self) -> str:
         return "OpenScene({}, {} x {})".format(self.name, *self.size)

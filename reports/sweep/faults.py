@@ -68,10 +68,10 @@ def reasons(sweep: Sweep) -> list[Reason]:
     """Return why cells have no numbers, each reason once, the most frequent first."""
     statuses = ["refused", *FAULTS]
     groups: dict[tuple[str, str], list[int]] = {}
-    texts, status, scenes = sweep.texts("reason"), sweep.texts("status"), sweep.texts("scene")
+    texts, status, scenes = sweep["reason"], sweep["status"], sweep["scene"]
     for row in np.flatnonzero(np.isin(status.astype(str), statuses)).tolist():
         groups.setdefault((status[row], without_numbers(texts[row] or "no reason given", scenes[row])), []).append(row)
-    labels, commands = sweep.texts("label"), sweep.texts("command")
+    labels, commands = sweep["label"], sweep["command"]
     made = [
         Reason(
             status=status,
@@ -97,7 +97,7 @@ def checks(sweep: Sweep) -> list[Check]:
     """Return how many images were checked for each fault, and how many have it."""
     made = []
     for name, counted, meaning in CHECKS:
-        pixels, scenes = sweep.numbers(counted), sweep.texts("scene")
+        pixels, scenes = sweep[counted], sweep["scene"]
         says, bad = np.isfinite(pixels), np.nan_to_num(pixels) > 0
         made.append(
             Check(name, int(says.sum()), len(set(scenes[says])), int(bad.sum()), len(set(scenes[bad])), meaning)
@@ -107,10 +107,10 @@ def checks(sweep: Sweep) -> list[Check]:
 
 def faults(sweep: Sweep) -> list[Fault]:
     """Return every image that is wrong, those with the most pixels first within a check."""
-    labels, scenes, commands, of = (*map(sweep.texts, ("label", "scene", "command")), sweep.numbers("error.pixels"))
+    labels, scenes, commands, of = (sweep[name] for name in ("label", "scene", "command", "error.pixels"))
     made = []
     for name, counted, _ in CHECKS:
-        pixels = np.nan_to_num(sweep.numbers(counted))
+        pixels = np.nan_to_num(sweep[counted])
         for row in sorted(np.flatnonzero(pixels > 0), key=lambda row: (-pixels[row], row)):
             whole = 0 if np.isnan(of[row]) else int(of[row])
             made.append(Fault(name, scenes[row], labels[row], int(pixels[row]), whole, commands[row] or ""))
@@ -140,21 +140,21 @@ def worst(sweep: Sweep, sample: Sample, properties: Sequence[str]) -> list[Worst
     places = [place for place in order if sample.measured[place]][:COUNT]
 
     def known(column: str, row: int) -> float | None:
-        value = float(sweep.numbers(column)[row])
+        value = float(sweep[column][row])
         return value if np.isfinite(value) else None
 
     return [
         Worst(
-            key=sweep.texts("key")[row],
+            key=sweep["key"][row],
             scene=sample.scenes[place],
-            medium=sweep.texts("medium")[row],
+            medium=sweep["medium"][row],
             relative_rmse=float(sample.errors[place]) if np.isfinite(sample.errors[place]) else None,
             p99=known("error.p99", row),
             relative_bias=known("error.relative_bias", row),
             reference_error=known("reference.error", row),
             nonfinite=int(sample.nonfinite[place]),
             properties={name: known(f"{PROPERTY}{name}", row) for name in properties},
-            command=sweep.texts("command")[row] or "",
+            command=sweep["command"][row] or "",
         )
         for place in places
         for row in [sample.rows[place]]

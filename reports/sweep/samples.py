@@ -27,14 +27,7 @@ from validation.study.row import COLUMNS, FRAME_MS, NO_REFERENCE, PROPERTY, STAT
 
 FILE = "sweep.parquet"  #: in the folder of a sweep
 
-Texts = NDArray[np.object_]
 Numbers = NDArray[np.float64]
-
-#: Columns without which nothing can be said.
-_NEEDED = (
-    *("key", "scene", "seed", "medium", "method", "label", "status", "reason"),
-    *("error.relative_rmse", "error.rmse", "reference.error"),
-)
 
 _CELL = ("scene", "medium", "label", "width", "height")  #: what makes a cell one: the label has method and parameters
 _ORDER = ("scene", "method", "label", "medium")
@@ -45,35 +38,29 @@ class Sweep:
     """Rows by columns, one of each cell, sorted: the order in which they were finished is chance."""
 
     path: Path
-    columns: Mapping[str, NDArray[Any]] = field(repr=False)  #: texts as objects, None for null; numbers with NaN
+    #: Texts as objects, None for null; numbers with NaN, truth values as 0 and 1.
+    columns: Mapping[str, NDArray[Any]] = field(repr=False)
     properties: tuple[str, ...]  #: names of the scenes' properties, without what begins their columns
     superseded: int = 0  #: rows of cells that were computed again: by newer source code, or to be timed
 
     def __len__(self) -> int:
         return len(self.columns["key"])
 
-    def texts(self, name: str) -> Texts:
-        """Return a column of text, None for null; all None for one that the Parquet lacks."""
-        missing = np.full(len(self), None, dtype=object)
-        return self.columns.get(name, missing)
-
-    def numbers(self, name: str) -> Numbers:
-        """Return a column of numbers, NaN for null; truth values are 0 and 1; all NaN for one that it lacks."""
-        missing = np.full(len(self), np.nan)
-        return self.columns.get(name, missing)
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self.columns[name]
 
     def property(self, name: str) -> Numbers:
         """Return a property of the scene of every row, NaN where it is not known."""
-        return self.numbers(PROPERTY + name)
+        return self[PROPERTY + name]
 
     def pictures(self, keys: Sequence[str]) -> dict[str, bytes]:
         """Return the pictures that the Parquet has of these rows, by key."""
         import pyarrow.compute as pc
         import pyarrow.parquet as pq
 
+        if not keys:
+            return {}
         with _reading(self.path):
-            if not keys or "picture" not in pq.read_schema(self.path).names:
-                return {}
             wanted = pc.field("key").isin(list(keys)) & pc.field("picture").is_valid()
             columns = ["key", "picture"]
             found = pq.read_table(self.path, columns=columns, filters=wanted, page_checksum_verification=True)
@@ -89,15 +76,14 @@ def read_sweep(path: Path | str) -> Sweep:
 
     file = _file_of(Path(path))
     with _reading(file):
-        names = [name for name in pq.read_schema(file).names if name != "picture"]
-        missing = [name for name in _NEEDED if name not in names]
+        names = pq.read_schema(file).names
+        missing = [column.key for column in COLUMNS if column.key not in names]
         if missing:
             raise InputError(
                 f"{file} has no column {missing[0]!r}, expected the columns of a sweep of this version of airlight; "
                 "run the sweep again: what its rows hold is kept"
             )
-        known = {column.key for column in COLUMNS}
-        wanted = [name for name in names if name in known or name.startswith(PROPERTY)]
+        wanted = [name for name in names if name != "picture"]
         table = pq.read_table(file, columns=wanted, page_checksum_verification=True)
         columns = {name: _array(table[name]) for name in table.column_names}
     if not table.num_rows:
@@ -137,16 +123,10 @@ def _current(columns: Mapping[str, NDArray[Any]]) -> list[int]:
     have been computed once for its error and once with the machine to itself for its time. The row of the source code
     that computed the cell last counts; of several such rows one that was timed alone, and else the last.
     """
-    rows = range(len(columns["key"]))
-
-    def column(name: str) -> list[Any]:
-        values = columns.get(name)
-        return [None] * len(rows) if values is None else values.tolist()
-
-    started = [each or "" for each in column("origin.started")]
-    source, alone = column("origin.source"), [each == 1 for each in column("cost.alone")]
+    started = [each or "" for each in columns["origin.started"]]
+    source, alone = columns["origin.source"], columns["cost.alone"] == 1
     cells: dict[tuple[Any, ...], list[int]] = {}
-    for row, cell in enumerate(zip(*(column(name) for name in _CELL))):
+    for row, cell in enumerate(zip(*(columns[name].tolist() for name in _CELL))):
         # NaN, where a number is not known, is not equal to itself.
         cells.setdefault(tuple(None if each != each else each for each in cell), []).append(row)
     kept = []
@@ -221,17 +201,17 @@ class Sample:
 
 def drawn_at_random(sweep: Sweep) -> bool:
     """Return whether any scene was drawn at random, so that claims are about such scenes alone."""
-    return bool(np.isfinite(sweep.numbers("seed")).any())
+    return bool(np.isfinite(sweep["seed"]).any())
 
 
 def samples(sweep: Sweep) -> list[Sample]:
     """Return the sample of every configuration, sorted by method and label."""
-    labels, scenes, statuses = sweep.texts("label"), sweep.texts("scene"), _statuses(sweep)
-    methods, errors = sweep.texts("method"), errors_of(sweep)
-    reference_errors = np.nan_to_num(sweep.numbers("reference.error"), nan=0.0)
-    nonfinite = np.nan_to_num(sweep.numbers("error.nonfinite"), nan=0.0)
-    times = np.where(comparable_times(sweep), sweep.numbers(FRAME_MS), np.nan)
-    counted = np.isfinite(sweep.numbers("seed")) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
+    labels, scenes, statuses = sweep["label"], sweep["scene"], _statuses(sweep)
+    methods, errors = sweep["method"], errors_of(sweep)
+    reference_errors = np.nan_to_num(sweep["reference.error"], nan=0.0)
+    nonfinite = np.nan_to_num(sweep["error.nonfinite"], nan=0.0)
+    times = np.where(comparable_times(sweep), sweep[FRAME_MS], np.nan)
+    counted = np.isfinite(sweep["seed"]) if drawn_at_random(sweep) else np.ones(len(sweep), dtype=bool)
     groups: dict[tuple[str, str, str], dict[str, list[int]]] = {}
     for row, label in enumerate(labels):
         if counted[row]:
@@ -278,9 +258,9 @@ def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]
     Those that were taken while nothing else of the sweep ran on the host, on the host, device and threads that have the
     most such rows.
     """
-    hosts, devices = sweep.texts("origin.host"), sweep.texts("origin.device")
-    places = list(zip(hosts, devices, np.nan_to_num(sweep.numbers("origin.threads")).tolist()))
-    alone = sweep.numbers("cost.alone") == 1
+    hosts, devices = sweep["origin.host"], sweep["origin.device"]
+    places = list(zip(hosts, devices, np.nan_to_num(sweep["origin.threads"]).tolist()))
+    alone = sweep["cost.alone"] == 1
     most = Counter(place for place, timed in zip(places, alone) if timed).most_common(1)
     return alone & np.array([bool(most) and place == most[0][0] for place in places], dtype=bool)
 
@@ -291,22 +271,22 @@ def errors_of(sweep: Sweep) -> Numbers:
     Where the reference is black, an image that is black too has no error, and any other an infinite one. An image
     without a finite pixel has an infinite error.
     """
-    done = sweep.texts("status") == "done"
-    relative, absolute = sweep.numbers("error.relative_rmse"), sweep.numbers("error.rmse")
+    done = sweep["status"] == "done"
+    relative, absolute = sweep["error.relative_rmse"], sweep["error.rmse"]
     unknown = np.where(absolute == 0, 0.0, np.inf)
     return np.where(done, np.where(np.isfinite(relative), relative, unknown), np.nan)
 
 
 def _size(sweep: Sweep, row: int) -> str:
-    width, height = sweep.numbers("width")[row], sweep.numbers("height")[row]
+    width, height = sweep["width"][row], sweep["height"][row]
     return f" at {width:.0f} x {height:.0f}" if np.isfinite(width) and np.isfinite(height) else ""
 
 
-def _statuses(sweep: Sweep) -> Texts:
+def _statuses(sweep: Sweep) -> NDArray[np.object_]:
     """Return the status of every row; rows whose scene has no reference are `UNTOLD`."""
-    reasons = zip(sweep.texts("status"), sweep.texts("reason"))
+    reasons = zip(sweep["status"], sweep["reason"])
     untold = [status in FAULTS and (reason or "").startswith(NO_REFERENCE) for status, reason in reasons]
-    return np.where(untold, UNTOLD, sweep.texts("status"))
+    return np.where(untold, UNTOLD, sweep["status"])
 
 
 def _badness(status: str, error: float) -> tuple[int, float]:

@@ -62,10 +62,10 @@ def summary_of(sweep: Sweep) -> Summary:
     made = tuple(samples(sweep))
     found = tuple(correlations(sweep, made))
     goes_with = {sample.label: tuple(strongest(found, sweep, sample)) for sample in made}
-    random = np.isfinite(sweep.numbers("seed"))
-    names = sweep.texts("scene")
+    random = np.isfinite(sweep["seed"])
+    names = sweep["scene"]
     drawn = drawn_at_random(sweep)
-    own = sweep.numbers("reference.error")
+    own = sweep["reference.error"]
     own = own[np.isfinite(own)]
     said = Summary(
         sweep=sweep,
@@ -84,11 +84,11 @@ def summary_of(sweep: Sweep) -> Summary:
         checks=tuple(checks(sweep)),
         faults=tuple(faults(sweep)),
         reference_errors=(float(np.median(own)), float(own.max())) if own.size else None,
-        versions={name: tuple(sorted(set(sweep.texts(f"origin.{name}")) - {None})) for name in _VERSIONS},
-        statuses=dict(Counter(sweep.texts("status").tolist()).most_common()),
+        versions={name: tuple(sorted(set(sweep[f"origin.{name}"]) - {None})) for name in _VERSIONS},
+        statuses=dict(Counter(sweep["status"].tolist()).most_common()),
         scenes=len(set(names[random] if drawn else names)),
         named_scenes=len(set(names[~random])) if drawn else 0,
-        studies=tuple(sorted(set(sweep.texts("study")) - {None})),
+        studies=tuple(sorted(set(sweep["study"]) - {None})),
         started=_span(sweep),
     )
     return replace(said, headlines=tuple(_headlines(said)))
@@ -160,7 +160,7 @@ def sound_words(said: Summary) -> str:
 
 
 def _span(sweep: Sweep) -> tuple[str, str] | None:
-    known = sorted(set(sweep.texts("origin.started")) - {None})
+    known = sorted(set(sweep["origin.started"]) - {None})
     return (_time_words(known[0]), _time_words(known[-1])) if known else None
 
 

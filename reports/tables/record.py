@@ -15,8 +15,7 @@ from html import escape
 from typing import Any
 
 from reports.tables.drawing import html, sentence_in_html, sentence_in_text, text
-from reports.tables.table import Column, Table
-from reports.tables.table import table as make_table
+from reports.tables.table import Table
 
 
 def colours_wanted() -> bool:
@@ -155,12 +154,6 @@ def bullets(items: Sequence[str]) -> str:
     """Return a list of sentences, in which what stands in backticks is code; nothing for no items."""
     inside = "".join(f"<li>{sentence_in_html(item)}</li>" for item in items)
     return f"<ul>{inside}</ul>" if items else ""
-
-
-def facts_table(rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of names and their values."""
-    columns = (Column("name", "", words=True), Column("value", "", words=True))
-    return html(make_table("", columns, rows))
 
 
 def picture(png: bytes, width: int, *, alt: str, caption: str) -> str:

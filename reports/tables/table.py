@@ -167,7 +167,7 @@ def fields_of(record: type, *keys: str, **how: Any) -> tuple[Column, ...]:
             each.heading,
             each.unit if each.unit in _UNITS else "",
             words=each.kind == "string",
-            meaning=each.meaning,
+            meaning=f"pixels {each.meaning}" if each.unit == "pixels" else each.meaning,
             **how,
         )
         for each in shown

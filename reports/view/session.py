@@ -34,7 +34,6 @@ from reports.view.widgets import (
     kernel_widgets,
     method_widgets,
     parameter_widgets,
-    scene_widgets,
 )
 from validation.columns import plain
 from validation.scenes.changes import Values
@@ -275,7 +274,7 @@ class Session:
             kernel=live.chosen.kernel,
             calls_kernel=calls_kernel(live.chosen),
             parameters=plain(parameter_widgets(live.chosen, area_lights=bool(live.scene.area_lights))),
-            changeable=plain(scene_widgets(live.there)),
+            changeable=plain(list(live.there.values())),
             changed=list(live.changes),
             commands={name: state.command(name) for name in ("view", "render", "reference")},
             notes=list(live.scene.features.notes),

@@ -15,7 +15,7 @@ from realtime.kernels.registry import KERNELS
 from realtime.methods.interface.method import method_parameters
 from realtime.methods.registry import METHODS, find_method
 from realtime.parameters import limits_of
-from validation.scenes.changes import Changeable, Values, change_words
+from validation.scenes.changes import Values, change_words
 from validation.study.configuration import Configuration
 
 
@@ -71,14 +71,6 @@ def parameter_widgets(chosen: Configuration, *, area_lights: bool) -> list[dict[
 def calls_kernel(chosen: Configuration) -> bool:
     """Return whether a method calls a kernel with its parameters."""
     return method_parameters(find_method(chosen.method), dict(chosen.parameters))[0].uses_kernel
-
-
-def scene_widgets(there: dict[str, Changeable]) -> list[dict[str, Any]]:
-    """Return the changeable numbers of a scene, with values and ranges."""
-    return [
-        {"name": item.name, "value": item.value, "least": item.least, "most": item.most, "unit": item.unit}
-        for item in there.values()
-    ]
 
 
 def _parameter(item: Field, value: Any) -> dict[str, Any]:

@@ -167,15 +167,15 @@ def test_parquet_is_read_as_it_was_written(tmp_path):
     sweep = read_sweep(write_rows(tmp_path / FILE, several).parent)
     assert len(sweep) == len(several) == 20
     by_key = {each["key"]: each for each in several}
-    for place, key in enumerate(sweep.texts("key")):
+    for place, key in enumerate(sweep["key"]):
         wanted = by_key.pop(key)
-        assert sweep.texts("scene")[place] == wanted["scene"]
+        assert sweep["scene"][place] == wanted["scene"]
         assert sweep.property("lights")[place] == wanted["properties.lights"]
         errors = [wanted["error.relative_rmse"] or np.nan]
-        np.testing.assert_array_equal(sweep.numbers("error.relative_rmse")[place : place + 1], errors)
+        np.testing.assert_array_equal(sweep["error.relative_rmse"][place : place + 1], errors)
     assert not by_key
     assert sweep.properties == ("light_distance", "lights", "optical_depth", "silhouettes", "triangles")
-    assert set(sweep.numbers("cost.alone")[sweep.texts("status") == "done"]) == {1.0}
+    assert set(sweep["cost.alone"][sweep["status"] == "done"]) == {1.0}
 
 
 @pytest.mark.claim("sweep-from-parquet")
@@ -183,8 +183,8 @@ def test_order_in_which_rows_were_finished_does_not_matter(tmp_path):
     several = rows(12)
     first = read_sweep(write_rows(tmp_path / "a.parquet", several))
     second = read_sweep(write_rows(tmp_path / "b.parquet", several[::-1]))
-    assert list(first.texts("key")) == list(second.texts("key"))
-    assert list(dict.fromkeys(first.texts("scene"))) == [f"random:{n}" for n in range(12)]  # 9 before 10
+    assert list(first["key"]) == list(second["key"])
+    assert list(dict.fromkeys(first["scene"])) == [f"random:{n}" for n in range(12)]  # 9 before 10
     assert [each.label for each in samples(first)] == [each.label for each in samples(second)]
 
 
@@ -206,7 +206,7 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
         row("random:2", key="g", timed_alone=False, **new),  # newer source goes before a time
     ]
     sweep = sweep_of(several)
-    assert sorted(sweep.texts("key")) == ["c", "d", "e", "g"]
+    assert sorted(sweep["key"]) == ["c", "d", "e", "g"]
     assert sweep.superseded == 3
 
 
@@ -215,7 +215,7 @@ def test_cells_that_were_computed_again_count_once(sweep_of):
     [
         (lambda path: None, "is not there; expected the folder of a sweep"),
         (lambda path: path.write_bytes(b""), "cannot be read as Parquet"),
-        (lambda path: pq.write_table(pa.table({"a": [1]}), path), "has no column 'key'"),
+        (lambda path: pq.write_table(pa.table({"a": [1]}), path), "has no column 'scene'"),
         (lambda path: write_rows(path, []), "has no rows"),
         (
             lambda path: pq.write_table(
