@@ -35,24 +35,27 @@ TABLE = (0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 1.0, 2.0, 5.0)
 TINY = {"single": 1e-37, "double": 1e-300}
 
 
-def evaluate_cases(
-    cases: Cases, function: Kernel, precision: str, refused: dict[str, str] | None = None, **options: Any
-) -> Array:
-    """Return J of every case, (cases,) [1/m], as `evaluate_rows` does.
+def evaluate_cases(cases: Cases, function: Kernel, precision: str, **options: Any) -> Array:
+    """Return J of every case, (cases,) [1/m], as `evaluate_rows` does; what the kernel refuses is raised."""
+    results, refused = evaluate_accepted(cases, function, precision, **options)
+    for reason in refused.values():
+        raise reason
+    return results
 
-    The words with which a kernel refuses a phase function go into `refused`, and J is NaN there; without it they are
-    raised.
-    """
+
+def evaluate_accepted(
+    cases: Cases, function: Kernel, precision: str, **options: Any
+) -> tuple[Array, dict[str, Exception]]:
+    """Return J of every case, and what the kernel raises for the phase functions that it refuses, where J is NaN."""
     names, results = np.asarray(cases.phase), np.full(len(cases.phase), np.nan)
+    refused: dict[str, Exception] = {}
     for name in dict.fromkeys(cases.phase):
         rows = np.flatnonzero(names == name)
         try:
             results[rows] = evaluate_rows(cases, rows, function, precision, **options)
         except (InputError, RealtimeInputError) as reason:
-            if refused is None:
-                raise
-            refused[name] = str(reason)
-    return results
+            refused[name] = reason
+    return results, refused
 
 
 def evaluate_rows(

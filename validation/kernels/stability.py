@@ -12,7 +12,7 @@ from realtime.kernels.registry import KERNELS
 from validation.arrays import Array, Bools, Counted
 from validation.certified.files import certified_data
 from validation.kernels.case_files import Cases, read_cases
-from validation.kernels.cases import Kernel, evaluate_cases
+from validation.kernels.cases import Kernel, evaluate_accepted
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays
 from validation.kernels.records import Rays, Stability
@@ -56,7 +56,10 @@ def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases]) -> Sta
     studied = []
     refused: dict[str, str] = {}
     for label, cases in sets.items():
-        values = {each: evaluate_cases(cases, function, each, refused) for each in PRECISIONS}
+        values: dict[str, Array] = {}
+        for each in PRECISIONS:
+            values[each], reasons = evaluate_accepted(cases, function, each)
+            refused |= {phase: str(reason) for phase, reason in reasons.items()}
         rows = groups(cases)
         errors = {each: errors_by_group(cases, values[each], each, rows, refused) for each in PRECISIONS}
         studied.append(Rays(name=label, columns=",".join(cases.header), **errors))

@@ -90,13 +90,16 @@ def light_references(
     """Return the airlight of the reference of each frame, (height, width, 3); in the end the scene is as it was.
 
     `scene`: the `mi.Scene`; `places`: the scene of each frame, of which `moves` says what moves, the first as it is
-    now; `progress`: called with the number of a frame and what. Raises InputError for area lights.
+    now; `progress`: called with the number of a frame and what. Raises InputError for area lights, and where
+    nothing moves.
     """
-    changes = [frame_changes(each, moves) for each in places]
+    if places[0].area_lights:
+        raise InputError("the scene has area lights, which its references cannot follow; expected a scene without")
+    changes = [frame_changes(each, moves) or {} for each in places]
+    if not changes[0]:
+        raise InputError("the scene has no light that could circle; expected a point, spot or directional light")
     references: list[Array] = []
     for number, change in enumerate([*changes, changes[0]]):
-        if not change:
-            raise InputError("the scene has area lights, which do not circle; expected a scene without")
         change_scene(scene, change)
         if number < len(places):
             if progress is not None:

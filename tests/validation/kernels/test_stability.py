@@ -16,7 +16,7 @@ from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.kernel_values import take
 from validation.kernels.benchmark import measure, speed_against_error
 from validation.kernels.case_files import read_cases
-from validation.kernels.cases import TABLE, evaluate_cases, integrate_cases, summary, write_results
+from validation.kernels.cases import TABLE, evaluate_accepted, evaluate_cases, integrate_cases, summary, write_results
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays, table, wide_rays, with_reference
 from validation.kernels.records import KernelCost, RayTime
@@ -62,9 +62,8 @@ def test_refusal_keeps_the_words_of_the_kernel(variant, error):
             raise error("no lobes here")
         return gauss(geometry, x0, x1, medium, light)
 
-    refused = {}
-    values = evaluate_cases(four_rays(), refuses, "single", refused)
-    assert refused == {"hg": "no lobes here"}
+    values, refused = evaluate_accepted(four_rays(), refuses, "single")
+    assert {phase: str(reason) for phase, reason in refused.items()} == {"hg": "no lobes here"}
     assert np.isfinite(values).tolist() == [True, True, True, False]
     errors = errors_by_group(four_rays(), values, "single", groups(four_rays()), refused)
     assert (errors["all"].rays, errors["all"].refused, errors["phase hg"].rays) == (3, 1, 0)

@@ -30,6 +30,7 @@ the error of a frame and falls as 1/N.
 """
 
 import math
+from dataclasses import replace
 
 import mitsuba as mi
 import numpy as np
@@ -46,7 +47,7 @@ from validation.scenes.registry import Animation
 from validation.study.causes import decompose
 from validation.study.configuration import Configuration, configuration, named_configurations, prepared
 from validation.study.growth import fitted_exponent
-from validation.study.motion import method_motion
+from validation.study.motion import light_references, method_motion
 
 # Steps enough that halving them changes no error below by more than 2 %.
 MARCH = {"steps": 1000, "shadow": "map"}
@@ -186,3 +187,6 @@ def test_what_does_not_move_is_refused(variant):
         method_motion(loaded.scene, loaded.animation, USUAL[:1])
     with pytest.raises(InputError, match="expected at least 10 for a step"):
         method_motion(loaded.scene, loaded.animation, USUAL[:1], stimulus="step", frames=9)
+    dark = replace(read_scene(loaded.scene), lights=(), area_lights=())
+    with pytest.raises(InputError, match="no light that could circle"):
+        light_references(loaded.scene, [dark], loaded.animation)
