@@ -251,7 +251,7 @@ def _measured(
     from realtime.methods.shader.source import is_users
     from reports.api.render import asked_configurations
     from reports.report.measure import write_report
-    from validation.study.cost import check_work, frame_work, reference_work
+    from validation.study.cost import TIMED, check_work, frame_work, reference_work
     from validation.study.study import RandomScenes, read_study, standard_study
 
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
@@ -267,7 +267,7 @@ def _measured(
 
         sizes = [images_size(tuple(several)) for several in shown.values()]
         works = [reference_work(size) for size in sizes]
-        works += [frame_work(size, steps=100, frames=8 * len(chosen)) for size in sizes]
+        works += [frame_work(size, steps=100, frames=TIMED * len(chosen)) for size in sizes]
         check_work("report --images", works)
     gc.freeze()  # modules live as long as the process: what looks for garbage before each frame need not look there
     typed = shlex.join(["airlight", *sys.argv[1:]])

@@ -90,7 +90,7 @@ def slab(
     """
     from validation.slab.light import expected_seconds, slab_numbers
     from validation.slab.request import slab_request
-    from validation.study.cost import forced
+    from validation.study.cost import Work, check_work
 
     if photons != int(photons) or photons == 1 or photons < 0:
         raise InputError(f"photons: got {photons}, expected a whole number from 2 on, for example 1000000")
@@ -98,11 +98,7 @@ def slab(
     request = slab_request(
         tau, sun, phase=os.fspath(phase), albedo=albedo, orders=chosen, depths=depths, directions=directions
     )
-    hours = expected_seconds(request, int(photons)) / 3600
-    if hours > 1 and not forced():
-        raise InputError(
-            f"photons: {photons} photons would take about {hours:.1f} hours; give fewer, or set AIRLIGHT_FORCE=1"
-        )
+    check_work(f"photons {photons}", [Work(expected_seconds(request, int(photons)))])
     with telling(progress, "slab") as tell:
         found = slab_numbers(request, photons=int(photons), progress=tell)
     words_of = {

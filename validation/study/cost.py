@@ -2,7 +2,9 @@
 """The time and memory of a command, estimated from counts before it starts, so that they are not a surprise.
 
 The costs are those of one processor thread, measured on two threads of an AMD EPYC on 22 November 2026 and rounded; a
-scene can be some times cheaper or costlier. That is enough to tell a minute from a day.
+scene can be some times cheaper or costlier. That is enough to tell a minute from a day, and to share a progress bar out
+among its parts. Whether one frame keeps a limit is another question: the code of a user's method cannot be counted, and
+`validation.study.run` times a small frame instead.
 """
 
 import os
@@ -53,18 +55,13 @@ def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False)
     return Work(pixels * samples * (_PATH if clouds else _SAMPLE), pixels * _SAMPLED_BYTES)
 
 
-def forced() -> bool:
-    """Return whether the user starts what `check_work` refuses."""
-    return os.environ.get("AIRLIGHT_FORCE", "0") not in ("", "0")
-
-
 def check_work(what: str, works: Iterable[Work]) -> None:
     """Refuse what would take more than an hour, or more memory than the machine has, unless it is forced.
 
     `what` is asked for, as the message begins, which gives the time, the memory and what to do.
     """
     works = list(works)
-    if forced() or not works:
+    if os.environ.get("AIRLIGHT_FORCE", "0") not in ("", "0") or not works:
         return
     threads = _GPU if (mi.variant() or "").startswith("cuda") else max(1, dr.thread_count())
     seconds, memory = sum(work.seconds for work in works) / threads, max(work.memory for work in works)
