@@ -1,60 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The clock and the scales: what work takes, by the wall clock and of the processors, and how much memory it holds.
+"""The clock and the scales: what work on the device takes, and how much memory it holds.
 
-A time runs from the call until the arrays are ready on the device (`drjit.sync_thread`). It is that of the wall clock
-on purpose: a user also waits for launch and replay. The processor time of all threads is beside it: other load on the
-machine changes it least. Repeated times come after a warm-up, in which kernels are compiled and recorded, as medians
-with quartiles.
+A time runs from the call until the arrays are ready on the device (`drjit.sync_thread`), by `analytic.clock`: a user
+also waits for launch and replay. Repeated times come after a warm-up, in which kernels are compiled and recorded, as
+medians with quartiles.
 """
 
 import ctypes
 import gc
-import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
 import drjit as dr
 import numpy as np
 
+from analytic.clock import Spent, stopwatch
 from validation.timing import Timing
 
 _MIB = 1024  # of the numbers in `status` [KiB]
 _FORGET = "5"  # what makes Linux forget the peak so far
 
-
-class Took(NamedTuple):
-    """The times of work."""
-
-    ms: float  #: by the wall clock [ms]
-    cpu_ms: float  #: of the processors, of all threads [ms]
+T = TypeVar("T")
 
 
-class Run(NamedTuple):
-    """The result of work, and its times."""
-
-    value: Any
-    ms: float  #: by the wall clock [ms]
-    cpu_ms: float  #: of the processors, of all threads [ms]
-
-
-def stopwatch() -> Callable[[], Took]:
-    """Return a function that says what was taken since now, until all arrays are ready."""
-    begin, spent = time.perf_counter(), time.process_time()
-
-    def took() -> Took:
-        dr.sync_thread()
-        return Took(1e3 * (time.perf_counter() - begin), 1e3 * (time.process_time() - spent))
-
-    return took
-
-
-def timed(work: Callable[[], Any]) -> Run:
-    """Do some work and return what it gave, with the times until its arrays are ready."""
+def timed(work: Callable[[], T]) -> tuple[T, Spent]:
+    """Do some work and return what it gave, and what it took until its arrays are ready."""
     took = stopwatch()
     value = work()
-    return Run(value, *took())
+    dr.sync_thread()
+    return value, took()
 
 
 def time_repeated(
@@ -79,12 +55,13 @@ def time_in_turns(
     for _ in range(warm_up):
         for work in works:
             timed(work)
-    turns: list[list[Run]] = []
-    stop = time.perf_counter() + seconds
-    while len(turns) < least or (time.perf_counter() < stop and len(turns) < most):
-        turns.append([timed(work) for work in works])
+    turns: list[list[Spent]] = []
+    so_far = stopwatch()
+    while len(turns) < least or (so_far().seconds < seconds and len(turns) < most):
+        turns.append([timed(work)[1] for work in works])
     return [
-        timing_of([run.ms for run in runs], cpu_ms=min(run.cpu_ms for run in runs)) for runs in zip(*turns, strict=True)
+        timing_of([each.ms for each in spent], cpu_ms=min(each.cpu_ms for each in spent))
+        for spent in zip(*turns, strict=True)
     ]
 
 

@@ -32,11 +32,12 @@ from dataclasses import asdict, dataclass, is_dataclass
 from functools import lru_cache, partial, update_wrapper
 from pathlib import Path
 from types import CodeType
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 import msgspec
 import numpy as np
 
+from analytic.clock import Spent, stopwatch
 from reference.storage.cache import drop_parts, is_stored, load_arrays, store_arrays
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -46,17 +47,10 @@ _ONLY_BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _FRESH = "AIRLIGHT_FRESH"  # results that are older count as missing [s since 1970]; child processes inherit it
 _ABOUT = ("seconds", "processor", "made")  # what is stored beside the arrays of a result
 _DATA, _ARRAY = "data", "array number"  # the array of the JSON of a value, and what stands there for an array
-_loaded = [0.0, 0.0]  # what the results took that this process has loaded, as `Spent`
+_loaded = [Spent()]  # what the results took that this process has loaded
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-
-class Spent(NamedTuple):
-    """The times of a computation."""
-
-    seconds: float  #: [s]
-    processor: float  #: of all threads of the process [s]
 
 
 @dataclass(frozen=True)
@@ -97,7 +91,7 @@ class KeptFunction(Generic[P, T]):
         found = load(key)
         if found is not None:
             return self._result(found)
-        spent = stopwatch()
+        spent = stopwatch_from_nothing()
         return self._store(key, self._function(*given, **others), spent())
 
     def keep(self, value: T, spent: Spent, *given: Any, **others: Any) -> None:
@@ -178,15 +172,15 @@ def load(key: str) -> Kept[dict[str, Any]] | None:
     if arrays is None:
         return None
     seconds, processor, made = (float(arrays.pop(name)) for name in _ABOUT)
-    took = loading()
-    add_spent(Spent(seconds - took.seconds, processor - took.processor))
-    return Kept(arrays, Spent(seconds, processor), made, True)
+    spent = Spent(seconds, processor)
+    add_spent(spent - loading())
+    return Kept(arrays, spent, made, True)
 
 
 def store(key: str, arrays: Mapping[str, Any], spent: Spent) -> Kept[dict[str, Any]]:
     """Keep arrays, and what they took."""
     made = time.time()
-    store_arrays(key, {**arrays, **dict(zip(_ABOUT, (*spent, made)))})
+    store_arrays(key, {**arrays, **dict(zip(_ABOUT, (spent.seconds, spent.processor, made)))})
     return Kept(dict(arrays), spent, made, False)
 
 
@@ -227,20 +221,20 @@ def date(seconds: float | None = None) -> str:
     return time.strftime("%Y-%m-%d %H:%M:%S %z", time.localtime(seconds))
 
 
-def stopwatch() -> Callable[[], Spent]:
-    """Return a function that says what it takes to compute from nothing what is computed from now on."""
-    start = Spent(time.perf_counter() + _loaded[0], time.process_time() + _loaded[1])
-    return lambda: Spent(time.perf_counter() + _loaded[0] - start[0], time.process_time() + _loaded[1] - start[1])
+def stopwatch_from_nothing() -> Callable[[], Spent]:
+    """Return a function that says what it takes to compute from nothing what is computed, or loaded, from now on."""
+    before, took = loaded_spent(), stopwatch()
+    return lambda: took() + (loaded_spent() - before)
 
 
 def add_spent(spent: Spent) -> None:
     """Count what another process spent, or what it once took to compute a result that was loaded."""
-    _loaded[:] = [before + more for before, more in zip(_loaded, spent)]
+    _loaded[0] += spent
 
 
 def loaded_spent() -> Spent:
     """Return the original time of all results that this process has loaded."""
-    return Spent(*_loaded)
+    return _loaded[0]
 
 
 def source_digest(*functions: Any) -> str:

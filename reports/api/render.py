@@ -314,10 +314,9 @@ def _animation(
     asked: _Asked, files: list[Path], frames: int, moves: str | None, progress: Progress
 ) -> "RenderedFrames":
     """Render the frames of an animation and write each as soon as it is done."""
-    import time
-
     import numpy as np
 
+    from analytic.clock import stopwatch
     from reports.api.results import RenderedFrames, write_image
     from reports.machine.environment import activate
     from reports.plotting.pictures import tone_curve
@@ -335,10 +334,10 @@ def _animation(
     changes_by_frame: list[dict[str, tuple[float, ...]] | None] = []
     kept = curve = None  # all frames share the tone curve of the first, so that a light that fades looks it
     shapes = frame_objects(renderer.scene, animation, frames)
-    start = time.perf_counter()
+    moving = stopwatch()
     with telling(progress, f"{loaded.name}: {frames} frames") as tell:
         for number, moved in enumerate(animate(renderer.scene, animation, frames), 1):
-            to_move = 1e3 * (time.perf_counter() - start)
+            to_move = moving().ms
             frame, kept, to_render = timed_image(renderer, moved, kept, **moved_parts(animation))
             costs.append((to_move, to_render))
             changes_by_frame.append(frame_changes(moved, animation))
@@ -347,23 +346,23 @@ def _animation(
                 write_image(_numbered(path, number, frames), layered_frame(loaded.name, chosen, frame), curve)
             del frame  # the next one needs its room
             tell(number / frames, f"frame {number} of {frames}")
-            start = time.perf_counter()
+            moving = stopwatch()
     about = [
         written
         for path in files
         if path.suffix.lower() == ".exr"
         for written in _write_frames(path, loaded.name, changes_by_frame, shapes)
     ]
-    moving, rendering = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
+    move_ms, render_ms = (float(value) for value in np.median(np.array(costs[1:] or costs), axis=0))
     return RenderedFrames(
         scene=loaded.name,
         method=chosen.label,
         size=(read.camera.width, read.camera.height),
         frames=frames,
         moves=tuple(animation.moves),
-        move_ms=moving,
-        render_ms=rendering,
-        frame_ms=moving + rendering,
+        move_ms=move_ms,
+        render_ms=render_ms,
+        frame_ms=move_ms + render_ms,
         recordings={stage: getattr(getattr(renderer.stages, stage), "n_recordings", 0) for stage in _STAGES},
         device=variant,
         files=(*(str(_numbered(path, number, frames)) for path in files for number in range(1, frames + 1)), *about),

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.clock import Spent, stopwatch
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches
 from reference.quadrature.ray_values import ReferenceImage
-from reference.storage.kept import Spent, fresh_results, fresh_since, stopwatch
+from reference.storage.kept import fresh_results, fresh_since
 from reports.cluster.connect import Client, facts
 from reports.cluster.run import Group, Task, run_groups
 from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
@@ -94,9 +95,9 @@ def spread(cluster: Client, image: Cell) -> ElsewhereFor:
 
 
 def _reference(image: Cell, how: Mapping[str, Any], since: float | None) -> tuple[ReferenceImage, Spent]:
-    scene, spent = load_cell(image).scene, stopwatch()
     with fresh_results(since):
-        return reference_image(scene, **how), spent()
+        found = reference_image.result(load_cell(image).scene, **how)
+    return found.value, found.spent
 
 
 def _batch(kind: bytes, seed: int) -> tuple[Batches, Spent]:

@@ -52,10 +52,11 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
 
 def _recorded(command: list[str], root: Path, variant: str) -> int:
     """Run all tests, write the record, and return the exit status."""
+    from analytic.clock import stopwatch
     from reference.storage.files import temporary_folder, write_text
     from reports.machine.environment import describe_environment, machine_in_words
 
-    start = time.monotonic()
+    took = stopwatch()
     with temporary_folder() as folder:
         status = subprocess.run([*command, f"--junit-xml={folder / 'tests.xml'}"], check=False).returncode
         suite = next(ElementTree.parse(folder / "tests.xml").iter("testsuite"))
@@ -65,7 +66,7 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
         "date": time.strftime("%Y-%m-%d %H:%M:%S %z"),
         "machine": machine_in_words(describe_environment() | {"variant": variant}),
         "commit": commit.strip() or "unknown",
-        "seconds": round(time.monotonic() - start),
+        "seconds": round(took().seconds),
         "passed": tests - failed - errors - skipped,
         "failed": failed + errors,
         "skipped": skipped,

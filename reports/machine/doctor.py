@@ -10,12 +10,12 @@ prints Debian's names of the packages that are missing, for the launcher.
 """
 
 import sys
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from analytic.clock import stopwatch
 from reports.machine.environment import (
     MissingError,
     atomic_problem,
@@ -219,9 +219,9 @@ def diagnose() -> Machine:
 
 def try_kernel(variant: str) -> Kernel:
     """Run a kernel in a separate process; raises EndedError or MissingError where it does not work."""
-    start = time.perf_counter()
+    took = stopwatch()
     kernel = in_own_process(probe, what="the test kernel in", name=variant, limit=_PATIENCE, variant=variant)
-    return replace(kernel, seconds=time.perf_counter() - start)
+    return replace(kernel, seconds=took().seconds)
 
 
 def probe() -> Kernel:

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analytic.clock import stopwatch
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.methods.shader.source import is_shader
@@ -77,7 +78,7 @@ def write_report(
         from validation.engine.images import images_size
 
         sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
-    environment, start = describe_environment(), time.monotonic()
+    environment, took = describe_environment(), stopwatch()
     if any(is_shader(chosen.method) for chosen in study.configurations):
         environment["opengl"] = require_opengl()
     process = in_own_process if apart else None
@@ -130,11 +131,11 @@ def write_report(
             del each, result
         gc.collect()
         by_kind: dict[str, list[Any]] = {}
-        seconds = {"scenes": time.monotonic() - start, "stability": 0.0, "scaling": 0.0, "papers": 0.0}
+        seconds = {"scenes": took().seconds, "stability": 0.0, "scaling": 0.0, "papers": 0.0}
         for part, step in zip(others, steps[len(names) :]):
-            begin = time.monotonic()
+            of_part = stopwatch()
             found = part.result(step)
-            seconds[part.kind] += time.monotonic() - begin
+            seconds[part.kind] += of_part().seconds
             by_kind.setdefault(part.kind, []).append(found.value)
             results.append(found)
         scaling = [each for found in by_kind.get("scaling", ()) for each in found]
@@ -145,7 +146,7 @@ def write_report(
             schema=SCHEMA,
             created=date(),
             command=command,
-            seconds=round(time.monotonic() - start, 1),
+            seconds=round(took().seconds, 1),
             parts={kind: round(taken, 2) for kind, taken in seconds.items()},
             cached=kept,
             computed=len(results) - kept,

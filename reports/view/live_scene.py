@@ -7,7 +7,6 @@ a method only in whether it finds out which surfaces are lit. Hits of camera ray
 still.
 """
 
-import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import Any
 
 import drjit as dr
 
+from analytic.clock import stopwatch
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.frame.incremental import FrameCache, next_frame
@@ -23,6 +23,7 @@ from realtime.methods.registry import find_method
 from realtime.methods.shader.method import Shader
 from realtime.parameters import defaults
 from realtime.scene.read_scene import read_again, read_scene
+from validation.clock import timed
 from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
 from validation.scenes.loading import load_scene
 from validation.study.configuration import Configuration, configuration, prepared
@@ -49,13 +50,15 @@ def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, floa
 
 def _clocked(name: str, stage: Callable[..., Any], times: dict[str, float]) -> Callable[..., Any]:
     def clocked(*arguments):
+        def work():
+            result = stage(*arguments)
+            if name != "prepare":  # whose states need not be arrays alone
+                dr.eval(result)
+            return result
+
         dr.sync_thread()
-        begin = time.perf_counter()
-        result = stage(*arguments)
-        if name != "prepare":  # whose states need not be arrays alone
-            dr.eval(result)
-        dr.sync_thread()
-        times[name] = times.get(name, 0.0) + 1e3 * (time.perf_counter() - begin)
+        result, took = timed(work)
+        times[name] = times.get(name, 0.0) + took.ms
         return result
 
     return clocked
@@ -127,7 +130,7 @@ class LiveScene:
 
         If the method refuses the scene or a parameter, all is as it was.
         """
-        begin = time.perf_counter()
+        took = stopwatch()
         before, self.chosen = self.chosen, chosen
         try:
             renderer = self._find_renderer()
@@ -136,7 +139,7 @@ class LiveScene:
             raise
         self._other_method |= renderer is not self.renderer
         self.renderer = renderer
-        return 1e3 * (time.perf_counter() - begin)
+        return took().ms
 
     def shader_stamp(self) -> tuple[Any, ...]:
         """Return a stamp of the files of the shader that is shown, which changes with them; None for another method."""
@@ -186,7 +189,7 @@ class LiveScene:
 
     def frame(self, *, by_stage: bool = False) -> Shown:
         """Render the next frame; `by_stage` times its stages, which makes it a little slower."""
-        begin = time.perf_counter()
+        took = stopwatch()
         renderer, times = timed_stages(self.renderer) if by_stage else (self.renderer, {})
         cache, moved = self._cache, dict(self._moved)
         if self._other_method and cache is not None:
@@ -197,7 +200,7 @@ class LiveScene:
         dr.sync_thread()
         self._other_method = False
         self._moved = dict.fromkeys(self._moved, False)
-        shown = Shown(stages, 1e3 * (time.perf_counter() - begin), times)
+        shown = Shown(stages, took().ms, times)
         if self.renderer.method.noisy:
             self._sum, self.summed = stages[2] + (0 if self._sum is None else self._sum), self.summed + 1
             dr.eval(self._sum)

@@ -10,7 +10,6 @@ of its pipe, however the view has ended.
 import os
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.clock import stopwatch
 from validation.metrics.errors import error_metrics
 from validation.scenes.changes import Values
 
@@ -164,11 +164,10 @@ def answers(task: Task) -> Iterator[Answer]:
     begin, rays = 0, _FIRST
     while begin < len(order):
         chosen = order[begin : begin + rays]
-        start = time.perf_counter()
+        took = stopwatch()
         found = reference_of_pixels(scene, chosen)
-        taken = time.perf_counter() - start
-        begin += len(chosen)
-        rays = int(np.clip(rays * np.clip(_CHUNK / max(taken, 1e-3), 0.25, 2), 16, _MOST))
+        begin, seconds = begin + len(chosen), took().seconds
+        rays = int(np.clip(rays * np.clip(_CHUNK / max(seconds, 1e-3), 0.25, 2), 16, _MOST))
         # The lights that the camera sees are left out: the frames beside this show none.
         layers = found.airlight, found.surface, found.airlight_bound
         airlight, surface, bound = (layer.reshape(-1, 3) for layer in layers)

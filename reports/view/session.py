@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from analytic.clock import stopwatch
 from analytic.errors import InputError, nearest
 from realtime.errors import InputError as MethodError
 from realtime.methods.interface.method import method_parameters
@@ -296,11 +297,11 @@ class Session:
         self._news |= self.live.goes_on
         if by_stage:
             self._stages = shown.stages_ms
-        begin = time.perf_counter()
+        took = stopwatch()
         _, surface, airlight = shown.stages
         how = {"layer": self._show["layer"], "factor": self._exposed()}
         picture = self._pictures.of_frame(self.live.renderer.pixel, surface, airlight, **how)
-        now = time.perf_counter()
+        picture_ms, now = took().ms, time.perf_counter()
         self._sent += 1
         page.show(
             picture,
@@ -308,7 +309,7 @@ class Session:
             frame=self._sent,
             size=self._size(),
             frame_ms=shown.frame_ms,
-            picture_ms=1e3 * (now - begin),
+            picture_ms=picture_ms,
             stages=self._stages,
             taken=self._moves,
             change_ms=None if self._asked_at is None else 1e3 * (now - self._asked_at),

@@ -18,12 +18,12 @@ extent leave out none: their fluence is bounded.
 """
 
 import math
-import time
 from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
 
+from analytic.clock import stopwatch
 from reference.monte_carlo.allocation import allocated
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
 from reference.quadrature.ray_values import ReferenceImage
@@ -85,8 +85,8 @@ def agreement(
         pilot = monte_carlo_batches(scene, estimator, batches=_PILOT, samples=samples, first_seed=LARGEST_SEED // 2)
         counts = allocated(pilot.batches, samples, shape=plain.distance.shape, masks=masks)
     # From here on: where a pilot alone takes long, no time was left for the batches that count.
-    start = time.monotonic()
-    go_on = None if seconds is None else (lambda done: time.monotonic() - start <= seconds)
+    took = stopwatch()
+    go_on = None if seconds is None else (lambda done: took().seconds <= seconds)
 
     def enough(so_far: Batches) -> bool:
         if layers and len(so_far.seeds) < _LEAST_BATCHES:

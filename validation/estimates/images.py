@@ -16,12 +16,12 @@ target before `LEAST_BATCHES`: the standard error of a standard error is 1/sqrt(
 """
 
 import math
-import time
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
+from analytic.clock import stopwatch
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
@@ -167,8 +167,7 @@ class _Watch:
         self._budget, self._near, self._progress = budget, near, progress
         self._expected = 0  # batches until the target is reached; not known before the first error
         self._words = ""
-        self._start = self._last = time.monotonic()
-        self._step = 0.0
+        self._took, self._last, self._step = stopwatch(), 0.0, 0.0
 
     def enough(self, batches: Batches) -> bool:
         """Say whether the target is reached; expect the error to fall with the square root of the batches."""
@@ -182,15 +181,15 @@ class _Watch:
     def go_on(self, done: int) -> bool:
         """Say whether another batch will end in time: it may take as long as the one before."""
         assert self._budget.seconds is not None
-        return time.monotonic() - self._start + self._step <= self._budget.seconds
+        return self._took().seconds + self._step <= self._budget.seconds
 
     def tell(self, done: int, total: int, estimator: str) -> None:
-        now = time.monotonic()
+        now = self._took().seconds
         self._step, self._last = now - self._last, now
         if self._progress is None:
             return
         if self._budget.seconds is not None:
-            fraction = (now - self._start) / self._budget.seconds
+            fraction = now / self._budget.seconds
         elif self._budget.samples is not None:
             fraction = done / total
         else:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.clock import Spent, stopwatch
 from analytic.errors import InputError
 from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, merged
 from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch, set_layers
@@ -29,7 +30,7 @@ from reference.scene.clouds import read_clouds
 from reference.scene.read import read_reference
 from reference.storage.cache import cache_folder, drop_arrays
 from reference.storage.files import NO_SPACE
-from reference.storage.kept import Spent, add_spent, is_damaged, is_kept, key_of, load, stopwatch, store
+from reference.storage.kept import add_spent, is_damaged, is_kept, key_of, load, stopwatch_from_nothing, store
 from validation.arrays import Counted
 from validation.estimates.quadrature import check_camera, check_rays
 
@@ -128,8 +129,7 @@ def monte_carlo_batches(
                     tally["brought"] += 1
                     if progress is not None:
                         progress(seeds[0] - first_seed + tally["brought"], batches, estimator)
-                took = waited()
-                add_spent(Spent(-took.seconds, -took.processor))  # what they spent counts, when their batches are read
+                add_spent(Spent() - waited())  # what they spent counts, when their batches are read
             block, whole = _block(folder, seeds, samples, layers, tally=tally, batch_of=kept_or_traced)
             if block is not None:
                 done = block if done is None else merged(done, block)
@@ -205,7 +205,7 @@ def _block(
     batch_of: Callable[[int], Batches | None],
 ) -> tuple[Batches | None, bool]:
     """Return the batches of some seeds added up, and whether they are all there."""
-    full, spent = len(seeds) == BLOCK, stopwatch()
+    full, spent = len(seeds) == BLOCK, stopwatch_from_nothing()
     block = _load(folder, seeds, samples, layers, tally) if full else None
     if block is not None:
         tally["done"] += BLOCK

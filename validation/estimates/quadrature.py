@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.clock import stopwatch
 from analytic.errors import InputError
 from analytic.geometry import foot_and_height
 from reference.quadrature.image import quadrature_image
@@ -39,7 +40,7 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import holds
 from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from reference.storage.exr import TOTAL
-from reference.storage.kept import kept, load, stopwatch, store
+from reference.storage.kept import kept, load, store
 from validation.arrays import Array, Bools, Counted
 
 _ROUNDING = 2.0**-24

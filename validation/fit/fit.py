@@ -2,13 +2,13 @@
 """The parameters of the fog that explain an image file of a scene, with their intervals."""
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from analytic.clock import stopwatch
 from analytic.errors import InputError
 from reference.storage.exr import Image
 from validation.arrays import Array, Bools, Progress
@@ -129,7 +129,7 @@ def fit_image(
     have bounds or density falls with height; area lights are 16 to 128 samples here, which leaves some 0.5 % in a
     pixel. The intervals count pixels as independent of one another.
     """
-    started = time.perf_counter()
+    took = stopwatch()
     kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene, mask=mask)
@@ -150,7 +150,7 @@ def fit_image(
         kinds, solved, lambda found: [_wrong(each[2]) for each in found], lambda each: _wrong(each[2]) < _EXACT
     )
     fit = _fit((loaded.name, path, judged.holds, kind.pixel), model, groups, solution, unknowns)
-    return replace(fit, seconds=time.perf_counter() - started, failures=wrong)
+    return replace(fit, seconds=took().seconds, failures=wrong)
 
 
 def _stage(progress: Progress, number: int, count: int) -> Progress:

@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from analytic.clock import Spent, stopwatch
 from realtime.frame.incremental import FrameCache, next_frame, next_parts
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.renderer import (
@@ -26,7 +27,7 @@ from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import Objects, read_objects, turned_objects
 from realtime.scene.camera import ray_directions
 from realtime.scene.read_scene import Scene
-from validation.clock import Took, stopwatch, time_repeated, timed, timing_of
+from validation.clock import time_repeated, timed, timing_of
 from validation.timing import FrameTimes, Timing
 
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
@@ -46,8 +47,8 @@ def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache,
     """
     in_turn, frame, kept, took = next_parts(renderer, scene, caches, **moved), None, [], 0.0
     while True:
-        run = timed(lambda: next(in_turn, None))
-        found, took = run.value, took + run.ms
+        found, spent = timed(lambda: next(in_turn, None))
+        took += spent.ms
         if found is None:
             assert frame is not None
             check_radiance(scene, renderer.method.name, frame.airlight, frame.surface, frame.distance)
@@ -55,7 +56,7 @@ def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache,
         part, stages, cache = found
         frame = frame_with_part(frame, part, stages, cache.extra)
         kept.append(cache)
-        del run, found, stages, cache
+        del found, stages, cache
 
 
 def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
@@ -100,7 +101,7 @@ def time_frame(
     scene = renderer.scene
     if took is None:
         first_frame(renderer)  # compiles and records
-        took = 1e-3 * timed(lambda: first_frame(renderer)).ms
+        took = timed(lambda: first_frame(renderer))[1].seconds
     if took > (SLOW if slow is None else slow):
         return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
     cache = first_frame(renderer)
@@ -140,8 +141,7 @@ def brief_times(renderer: FrameRenderer) -> tuple[FrameTimes, float]:
 
     The renderer has made a frame before, so that its kernels are compiled.
     """
-    preparation = timed(lambda: renderer.prepare(renderer.scene))
-    state = preparation.value
+    state, preparation = timed(lambda: renderer.prepare(renderer.scene))
     frame = _brief(lambda: run_stages(renderer, state))
     if frame.median_ms >= _BRIEF_SLOW:  # camera rays and surfaces take little of it, and it takes too long to ask
         return FrameTimes(frame, frame), preparation.ms
@@ -168,7 +168,7 @@ def shader_times(renderer: FrameRenderer, seconds: float | None = None) -> tuple
 
 def _brief(work: Callable[[], Any]) -> Timing:
     """Time some runs after one of warm-up; a slow one is not repeated."""
-    first = timed(work)
+    _, first = timed(work)
     if first.ms >= _BRIEF_SLOW:
         return timing_of([first.ms], cpu_ms=first.cpu_ms)
     return time_repeated(work, seconds=_BRIEF, least=1, most=_BRIEF_MOST, warm_up=0)
@@ -176,16 +176,17 @@ def _brief(work: Callable[[], Any]) -> Timing:
 
 def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
     """Time the stages of some frames; objects are moved once, after a warm-up: no method changes what that takes."""
-    there, in_parts, move = renderer.scene, parts(renderer), 0.0
+    there, in_parts, move = renderer.scene, parts(renderer), Spent()
     objects = _objects(there)
     if objects:
         for _ in range(2):
-            there, move, _ = timed(lambda: turned_objects(renderer.scene, objects, np.eye(3)))
+            there, move = timed(lambda: turned_objects(renderer.scene, objects, np.eye(3)))
     steps = []
     for _ in range(turns):
         times, took = [0.0], stopwatch()
 
-        def done(times: list[float] = times, took: Callable[[], Took] = took) -> None:
+        def done(times: list[float] = times, took: Callable[[], Spent] = took) -> None:
+            dr.sync_thread()
             times.append(took().ms)
 
         state = renderer.prepare(there)
@@ -209,7 +210,7 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
         surface=timing_of(surface),
         airlight=timing_of(airlight),
         light_moved=timing_of(light_moved),
-        objects_moved=timing_of(move + light_moved),
+        objects_moved=timing_of(move.ms + light_moved),
         light_moved_camera_cached=timing_of(shade + airlight + prepare * bool(needed & {"light", "look"})),
         colours_changed=timing_of(shade + airlight + prepare * ("look" in needed)),
     )

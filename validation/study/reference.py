@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.clock import Spent
 from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import PointPlan
-from reference.storage.kept import Spent, kept, stopwatch
+from reference.storage.kept import kept
 from validation.arrays import Array
 from validation.estimates.quadrature import reference_image, reference_of_pixels
 from validation.metrics.errors import FLOOR
@@ -32,7 +33,7 @@ _FRACTION = 16  # one pixel in so many has a reference where lights have an exte
 
 _LEAST = 64  # pixels that have one
 _SEED = 20261123  # of their choice
-_UNKNOWN = Spent(0.0, 0.0)
+_UNKNOWN = Spent()
 _STANDARD_ERRORS = 3.0  # that a bound has of an area light
 
 
@@ -64,7 +65,8 @@ class Reference:
             mean,
             float(bound.mean()) / mean if known else None,
             float((bound / np.maximum(airlight, FLOOR * mean)).max()) if known else None,
-            *self.spent,
+            self.spent.seconds,
+            self.spent.processor,
             self.crossings,
         )
 
@@ -83,8 +85,8 @@ def load_cell(cell: Cell) -> LoadedScene:
 def cell_reference(loaded: LoadedScene) -> Reference:
     """Return the reference of a loaded scene, from the cache where it was computed before."""
     if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
-        spent = stopwatch()
-        return of_image(reference_image(loaded.scene), spent())
+        whole = reference_image.result(loaded.scene)
+        return of_image(whole.value, whole.spent)
     result = sampled_reference.result(loaded.scene)
     some = result.value
     return Reference(some["airlight"], some["bound"], None, some["mask"], None, result.spent)

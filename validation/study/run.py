@@ -18,6 +18,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.clock import stopwatch
 from analytic.errors import InputError as ReferenceInputError
 from realtime.errors import InputError
 from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame, run_stages, unchecked_frame
@@ -26,7 +27,7 @@ from realtime.methods.registry import find_method
 from realtime.methods.shader.source import is_shader
 from realtime.scene.read_scene import Scene, read_scene
 from reference.storage.exr import Image
-from validation.clock import peak_memory, stopwatch, time_repeated, timed
+from validation.clock import peak_memory, time_repeated, timed
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
@@ -99,8 +100,8 @@ def run(
         )
         row = replace(row, picture=paint(known, shown))
     assert row.cost is not None
-    lights, (work_ms, cpu_ms) = rendered_lights(scene, cell.chosen), took()
-    cost = replace(row.cost, lights=lights, work_ms=work_ms, cpu_ms=cpu_ms)
+    lights, spent = rendered_lights(scene, cell.chosen), took()
+    cost = replace(row.cost, lights=lights, work_ms=spent.ms, cpu_ms=spent.cpu_ms)
     return replace(row, cost=cost), frame
 
 
@@ -143,17 +144,17 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     dr.detail.malloc_clear_statistics()
     before = dr.detail.launch_stats()
     try:
-        renderer, making, _ = timed(partial(prepared, scene, chosen))
-        reason = _too_long(renderer, cell, 1e-3 * making)
+        renderer, making = timed(partial(prepared, scene, chosen))
+        reason = _too_long(renderer, cell, making.seconds)
         if reason:
             return row_of(status="left out", reason=reason), None
-        frame, first, _ = timed(partial(render_frame if wanted.times == "stages" else _unchecked, renderer))
+        frame, first = timed(partial(render_frame if wanted.times == "stages" else _unchecked, renderer))
     except InputError as error:
         return row_of(status="refused", reason=str(error)), None
     after = dr.detail.launch_stats()
     backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
     watermark = int(dr.detail.malloc_watermark(backend))
-    cost = Cost(making + first, None, after[0] - before[0], after[2] - before[2], watermark)
+    cost = Cost(making.ms + first.ms, None, after[0] - before[0], after[2] - before[2], watermark)
     if is_shader(chosen.method):
         shown = renderer if timed_scene is None or wanted.times == "with" else prepared(timed_scene, chosen)
         seconds = wanted.seconds if wanted.times == "stages" else None
@@ -165,7 +166,7 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     if wanted.times != "stages":
         return row_of(cost=cost), frame
     notes = []
-    if timed_scene is not None and first > 1e3 * _LONG:
+    if timed_scene is not None and first.seconds > _LONG:
         timed_scene = None
         notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
     if chosen.own and not is_shader(chosen.method) and not find_method(chosen.method).frozen:
@@ -174,7 +175,7 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     took: list[float] = []
 
     def again() -> None:
-        took.append(1e-3 * timed(lambda: render_frame(shown)).ms)
+        took.append(timed(lambda: render_frame(shown))[1].seconds)
 
     memory = peak_memory(again)
     if timed_scene is not None and took and took[0] < _RECORDED:
@@ -284,8 +285,8 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
         return None
     if many:
         renderer.prepare(renderer.scene)  # compiles
-    states, milliseconds, _ = timed(lambda: renderer.prepare(renderer.scene))
-    preparation = 1e-3 * milliseconds * len(states) / sum(state is not None for state in states)
+    states, spent = timed(lambda: renderer.prepare(renderer.scene))
+    preparation = spent.seconds * len(states) / sum(state is not None for state in states)
     del states
     words = f"more than the limit of {limit:g} s"
     if preparation > limit:
@@ -294,7 +295,7 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
         return None
     small, large = prepared(read_scene(load_cell(replace(cell, size=PROBE)).scene), chosen), renderer.scene.camera
     render_frame(small)
-    took = 1e-3 * timed(lambda: render_frame(small)).ms
+    took = timed(lambda: render_frame(small))[1].seconds
     fraction = (large.width * large.height) / (PROBE[0] * PROBE[1])
     expected = preparation + max(0.0, took - preparation) * fraction
     if expected <= limit:

@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.clock import Spent
 from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image
-from reference.storage.kept import Kept, Spent, kept
+from reference.storage.kept import Kept, kept
 from reference.storage.scene_digest import scene_digest
 from validation.arrays import Array
 from validation.columns import record_of
@@ -277,7 +278,7 @@ def measured(
 def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: Mapping[Configuration, str]) -> Judged:
     if chosen in ended:
         row = cell_row(study.cell(chosen), status="refused", reason=ended[chosen])
-        return Judged(row, results=(Kept(row, Spent(0.0, 0.0), time.time(), False),))
+        return Judged(row, results=(Kept(row, Spent(), time.time(), False),))
     reference = study.reference  # loaded or computed now: it is no part of the time of a configuration
     result = measured.result(*study.given(chosen), study=study, apart=apart)
     judged = replace(result.value, results=(result,))

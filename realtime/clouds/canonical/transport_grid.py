@@ -77,7 +77,6 @@ class CanonicalTransport:
     entries: Array  #: (sets, thicknesses, depths, suns, directions, azimuths, 4), float16
     sources: Array  #: log Q_0 (sets, thicknesses, depths, suns), float32
     angular: Array  #: P_s at even angles (sets, ENTRIES), float32
-    seconds: float  #: that it took to make them [s]
 
     @property
     def size(self) -> int:
@@ -99,9 +98,9 @@ def canonical_transport(phase: SlabPhase, albedo: float, *, progress: Progress |
     arrays = load_kept(digest, medium)
     if arrays is None:
         made = computed_transport(phase, albedo, progress or logged("grid of clouds"))
-        keep(digest, medium, {**vars(made), "seconds": np.float64(made.seconds)})
+        keep(digest, medium, vars(made))
         return made
-    return CanonicalTransport(arrays["entries"], arrays["sources"], arrays["angular"], float(arrays["seconds"]))
+    return CanonicalTransport(arrays["entries"], arrays["sources"], arrays["angular"])
 
 
 def logged(made: str) -> Progress:
@@ -130,7 +129,6 @@ def transport_digest() -> str:
 
 def computed_transport(phase: SlabPhase, albedo: float, progress: Progress) -> CanonicalTransport:
     """Compute the transport; parameters as above."""
-    began = time.perf_counter()
     angular = repeated_scattering(phase)
     thicknesses = coordinates.thicknesses(SIDES[0])
     mu = np.sin(np.pi * (np.linspace(0, 1, SIDES[3]) - 0.5))
@@ -152,12 +150,7 @@ def computed_transport(phase: SlabPhase, albedo: float, progress: Progress) -> C
             progress(len(entries) / len(thicknesses), f"thickness {t:.3g}")
     sources = np.stack([_finer_sources(number, np.stack(level)) for number, level in enumerate(zip(*levels))])
     packets = np.stack([_filled(np.stack(of_set)) for of_set in zip(*entries)])
-    return CanonicalTransport(
-        packets.astype(np.float16),
-        sources.astype(np.float32),
-        angular.astype(np.float32),
-        time.perf_counter() - began,
-    )
+    return CanonicalTransport(packets.astype(np.float16), sources.astype(np.float32), angular.astype(np.float32))
 
 
 def _entries(slabs: DirectionalMoments, angular: Array, t: float) -> tuple[Array, Array]:

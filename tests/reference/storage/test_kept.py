@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analytic.clock import Spent
 from reference.monte_carlo.volpath import volpath_batch
 from reference.quadrature.image import quadrature_image
 from reference.storage import kept as module
 from reference.storage.kept import (
-    Spent,
     add_spent,
     code_digest,
     fresh_results,
@@ -28,7 +28,7 @@ from reference.storage.kept import (
     key_of,
     load,
     source_digest,
-    stopwatch,
+    stopwatch_from_nothing,
     store,
 )
 from reports.machine.driver_check import error_of_device
@@ -124,7 +124,7 @@ def test_times_are_those_of_computing_and_never_of_loading():
     made = from_the_reference.result()
     assert made.spent.seconds == pytest.approx(1100.0, abs=5.0)
     assert made.spent.processor == pytest.approx(150.0, abs=5.0)
-    spent = stopwatch()
+    spent = stopwatch_from_nothing()
     assert from_the_reference.result().spent == made.spent
     assert spent().seconds == pytest.approx(made.spent.seconds, abs=5.0)
 

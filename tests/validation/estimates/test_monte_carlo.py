@@ -294,8 +294,8 @@ def test_no_target_is_met_by_what_is_no_number(odd, layer):
 @pytest.fixture
 def clock(monkeypatch):
     """A clock of our own; `clock.now` is what it shows [s]."""
-    clock = SimpleNamespace(now=50.0)
-    monkeypatch.setattr(validation.estimates.images, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    clock = SimpleNamespace(now=50.0, process_time=lambda: 0.0, perf_counter=lambda: clock.now)
+    monkeypatch.setattr("analytic.clock.time", clock)
     return clock
 
 

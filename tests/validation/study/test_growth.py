@@ -117,7 +117,7 @@ class Clock:
 @pytest.fixture
 def clock(variant, monkeypatch):
     clock = Clock()
-    monkeypatch.setattr("validation.clock.time", clock)
+    monkeypatch.setattr("analytic.clock.time", clock)
     return clock
 
 

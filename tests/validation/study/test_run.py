@@ -15,7 +15,6 @@ from realtime.memory import Memory
 from realtime.methods.unshadowed import unshadowed
 from realtime.scene.read_scene import SceneFeatures, read_scene
 from reports.commands.main import run as run_command
-from validation.estimates import agreement
 from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
 from validation.study import cost as expected_work
@@ -149,7 +148,7 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(monkeypatc
 
     monkeypatch.setattr(module, "_DOUBTFUL", -1.0)
     monkeypatch.setattr(module, "PROBE", (8, 6))
-    monkeypatch.setattr("validation.clock.time", clock)
+    monkeypatch.setattr("analytic.clock.time", clock)
     monkeypatch.setattr(module, "render_frame", slowed)
     row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.3))[0]
     assert (row.status, row.error, row.times) == ("left out", None, None)
@@ -166,7 +165,7 @@ def test_a_frame_is_judged_by_the_preparation_of_all_its_groups_of_lights(monkey
         clock.now += 1
         return prepare(renderer, scene)
 
-    monkeypatch.setattr("validation.clock.time", clock)
+    monkeypatch.setattr("analytic.clock.time", clock)
     monkeypatch.setattr(FrameRenderer, "prepare", slowed)
     monkeypatch.setattr(module, "light_groups", lambda renderer: ("first", "second"))
     row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.5))[0]
@@ -280,7 +279,8 @@ def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypa
     hours = iter(range(0, 10**9, 3600))
     quiet = checked(**exact)
     own_cache.rename(own_cache.with_name("other"))
-    monkeypatch.setattr(agreement, "time", SimpleNamespace(monotonic=lambda: float(next(hours))))
+    clock = SimpleNamespace(perf_counter=lambda: float(next(hours)), process_time=lambda: 0.0)
+    monkeypatch.setattr("analytic.clock.time", clock)
     busy = checked(**exact)
     assert quiet
     assert busy == quiet
