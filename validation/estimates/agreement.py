@@ -37,9 +37,6 @@ from validation.statistics.comparison import Estimate, compare_statistics
 from validation.statistics.records import Agreement, Statistics
 
 MASK_PIXELS = 2.0
-#: The least margin under area lights, where the quadrature has its own errors: 2.4e-4 of the mean surface of `overlap`,
-#: 5.7e-4 with the factor of Student's law for eight replicates. No batch makes it less.
-WIDE_MARGIN = 0.0015
 _LEAST_BATCHES = 32  # below, the standard error of a standard error exceeds 13 %
 _SAMPLES = 64  # a pixel in each batch
 _PILOT = 8  # batches that say where volpath's samples go, with seeds that no run reaches
@@ -134,16 +131,14 @@ def agreements(
 ) -> dict[str, Agreement]:
     """Compare several estimators with the quadrature image.
 
-    By estimator there are the `margins` of the relative bias [1], under area lights at least `WIDE_MARGIN`, and
-    the `samples`; each takes so many `batches` and `seconds` at most; `points`: see `agreement`. The result is by
-    estimator and layer, as in 'volpath airlight'.
+    By estimator there are the `margins` of the relative bias [1] and the `samples`; each takes so many `batches` and
+    `seconds` at most; `points`: see `agreement`. The result is by estimator and layer, as in 'volpath airlight'.
     """
     by_name: dict[str, Agreement] = {}
-    least = WIDE_MARGIN if read_reference(scene).area else 0.0
     for estimator, margin in margins.items():
         how: dict[str, Any] = {"batches": batches, "samples": (samples or {}).get(estimator, _SAMPLES)}
         how |= {"seconds": seconds, "points": points, "spread": spread}
-        by_layer = agreement(scene, estimator=estimator, margin=max(margin, least), **how)
+        by_layer = agreement(scene, estimator=estimator, margin=margin, **how)
         by_name |= {f"{estimator} {layer}": result for layer, result in by_layer.items()}
     return by_name
 

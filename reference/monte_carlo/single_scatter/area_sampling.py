@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Sampling points on area lights, in Dr.Jit: evenly over the area, and towards the ray.
+r"""Sampling points on area lights, in Dr.Jit: for places on surfaces, and towards the ray.
+
+A surface point has points that are even over the area, or over the disk as which it sees a sphere: with theta the angle
+at the centre between a point of the sphere and the way to the place, cos(theta)^2 is uniform above (R/d)^2 and the
+density cos(theta)/(pi R^2 (1 - (R/d)^2)).
 
 For one point y of a light, the distances along a camera ray come from
 `reference.monte_carlo.single_scatter.distance_sampling`, as for a point light at y. The value of such a sample is
@@ -41,6 +45,7 @@ from reference.scene.device import on_device
 
 _PARALLEL = 1e-9  # sine of the angle between ray and plane below which they count as parallel
 _FADE = 16.0  # how soon points about the ray become fewer as it passes further from the light
+_OUTSIDE = 1e-5  # of the radius of a sphere: what is closer to it touches it
 _TOUCHING = 1e-12  # of a light's size: no direction is known over a shorter way
 _LEAST = 1e-30
 
@@ -65,7 +70,7 @@ class Triangles:
     count: int  #: how many there are
     area: float  #: of all [m^2]
 
-    def evenly(self, u, v) -> LightSample:
+    def facing(self, u, v, place) -> LightSample:
         """Sample points evenly over the area."""
         number = dr.binary_search(0, self.count - 1, lambda i: dr.gather(mi.Float64, self.below, i) <= u)
         return self._even(number, u, v)
@@ -131,7 +136,7 @@ class Flat:
         """Its area [m^2]."""
         return (math.pi if self.round else 4) * self.half[0] * self.half[1]
 
-    def evenly(self, u, v) -> LightSample:
+    def facing(self, u, v, place) -> LightSample:
         """Sample points evenly over the area."""
         x, y = self._even(u, v)
         return LightSample(self._at(x, y), self.normal, mi.Float64(1 / self.area))
@@ -194,10 +199,17 @@ class Ball:
         """Its area [m^2]."""
         return 4 * math.pi * self.radius**2
 
-    def evenly(self, u, v) -> LightSample:
-        """Sample points evenly over the area."""
-        normal = _towards(1 - 2 * v, 2 * math.pi * u, mi.Vector3d(0, 0, 1))
-        return LightSample(self.centre + self.radius * normal, normal, mi.Float64(1 / self.area))
+    def facing(self, u, v, place) -> LightSample:
+        """Sample points of the cap that places outside see, evenly over its projection towards them."""
+        way = place - self.centre
+        distance = dr.maximum(dr.norm(way), _LEAST)
+        # A place on the sphere or in it sees nothing, wherever the samples are.
+        outside = distance > self.radius * (1 + _OUTSIDE)
+        edge = dr.select(outside, dr.square(self.radius / distance), 0)
+        cosine = dr.sqrt(edge + v * (1 - edge))
+        normal = _towards(cosine, 2 * math.pi * u, way / distance)
+        density = 4 * cosine / (self.area * (1 - edge))
+        return LightSample(self.centre + self.radius * normal, normal, density)
 
     def towards(self, u, v, origin, direction) -> LightSample:
         """Sample points on the side turned to the ray, and about the two places where the ray meets the sphere."""
@@ -225,7 +237,7 @@ class Ball:
         return LightSample(self.centre + normal * radius, normal, density)
 
 
-#: Emitting surfaces: `evenly(u, v)` samples points over the area, `towards(u, v, origin, direction)` for camera rays.
+#: Emitting surfaces: `facing(u, v, place)` samples points for surfaces, `towards(u, v, origin, direction)` for rays.
 Emitting = Triangles | Flat | Ball
 
 

@@ -49,8 +49,8 @@ class _Near(ABC):
     medium: Any = None  # pointer to what every path begins in, where that is known
 
     @abstractmethod
-    def point(self, numbers, ray: Ray | None) -> LightSample:
-        """Return the points of samples with these numbers, for surfaces where no ray is given."""
+    def point(self, numbers, to: Ray | Any) -> LightSample:
+        """Return the points of samples with these numbers, for rays or for places of double precision."""
 
     @abstractmethod
     def sent(self, point: LightSample, at, from_light) -> Any:
@@ -83,7 +83,7 @@ class _Near(ABC):
 
     def on_surface(self, numbers, hit, active) -> tuple[Any, Path, Any]:
         """Return unit vectors to the light, paths, and the irradiance across them of surfaces."""
-        light = self.point(numbers, None)
+        light = self.point(numbers, mi.Point3d(hit.p))
         way = hit.p - mi.Point3f(light.position)
         r = dr.norm(way)
         from_light = way / r
@@ -109,7 +109,7 @@ class PointSource(_Near):
     medium: Any = None  #: pointer to what it is in, where that is known
     varies = False
 
-    def point(self, numbers, ray: Ray | None) -> LightSample:
+    def point(self, numbers, to: Ray | Any) -> LightSample:
         """Return its place, for every sample."""
         return LightSample(self.position, mi.Vector3d(0), mi.Float64(1))
 
@@ -133,12 +133,12 @@ class AreaSource(_Near):
     radiance: Any  #: RGB [W/(m^2 sr)]
     varies = True
 
-    def point(self, numbers, ray: Ray | None) -> LightSample:
-        """Return points that are spread towards rays, or evenly over the area."""
+    def point(self, numbers, to: Ray | Any) -> LightSample:
+        """Return points that are spread towards rays, or face places."""
         u, v = numbers
-        if ray is None:
-            return self.shape.evenly(u, v)
-        return self.shape.towards(u, v, ray.origin_double, ray.direction_double)
+        if isinstance(to, Ray):
+            return self.shape.towards(u, v, to.origin_double, to.direction_double)
+        return self.shape.facing(u, v, to)
 
     def sent(self, point: LightSample, at, from_light) -> Any:
         """Return the intensity of points."""

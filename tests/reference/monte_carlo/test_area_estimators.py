@@ -154,25 +154,35 @@ def test_surfaces_are_those_of_mitsubas_direct_integrator(variant, kind):
 def test_density_of_points_on_a_light(variant, kind):
     """Rationale: an importance density that is wrong anywhere is a bias.
 
-    Setup: rays that meet the light, pass beside it and along its edge; a million points each.
-    Expected: the mean of 1/density over any part of the light is the area of that part, within four standard errors.
+    Setup: a place that faces it, rays that meet it, pass beside it and along its edge; a million points each.
+    Expected: the mean of 1/density over any part of the light that faces the place, or all rays, is the area of that
+    part, within four standard errors.
     """
 
     (light,) = read_reference(lit_scene(lamp=_lamp(kind, BLACK))).area
     shape, count = emitting(light), 1 << 20
     u, v = (mi.Float64(values) for values in np.random.default_rng(5).random((2, count)))
     centre, (across, up, _) = light.centre, light.frame
-    even = shape.evenly(u, v)
+    place = centre + np.array([0.9, 0.4, -1.3])
+    faces, seen = shape.facing(u, v, mi.Point3d(*map(float, place))), np.full(count, True)
+    even, drawn = np.array(faces.position).T, [(faces, seen)]
+    if kind == "sphere":
+        normal = np.random.default_rng(6).normal(size=(count, 3))
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        even = centre + light.radius * normal
+        drawn = [(faces, normal @ (place - centre) > light.radius)]
     for aside in (0.0, 0.7, 1.0, -1.0, 3.0):
         through = centre + aside * light.half[0] * across
         direction = np.array([0.31, -0.83, 0.29])
         for origin in (through - 2 * direction, through + 2 * direction):
             direction /= np.linalg.norm(direction)
-            point = shape.towards(u, v, mi.Point3d(*map(float, origin)), mi.Vector3d(*map(float, direction)))
-            density = np.array(point.density)
-            worth = np.divide(1, density, out=np.zeros(count), where=density > 0)
-            for part in (lambda place: place @ across > -9, lambda place: (place @ across > 0.05) & (place @ up < 0.1)):
-                inside = part(np.array(point.position).T - centre)
-                fraction = float(part(np.array(even.position).T - centre).mean())
-                error = (worth * inside).std() / np.sqrt(count) + 2e-3 * light.area * (fraction < 1)
-                assert abs((worth * inside).mean() - fraction * light.area) < 4 * error + 1e-9
+            to = mi.Point3d(*map(float, origin)), mi.Vector3d(*map(float, direction))
+            drawn.append((shape.towards(u, v, *to), seen))
+    for point, meant in drawn:
+        density = np.array(point.density)
+        worth = np.divide(1, density, out=np.zeros(count), where=density > 0)
+        for part in (lambda place: place @ across > -9, lambda place: (place @ across > 0.05) & (place @ up < 0.1)):
+            inside = part(np.array(point.position).T - centre)
+            fraction = float((part(even - centre) & meant).mean())
+            error = (worth * inside).std() / np.sqrt(count) + 2e-3 * light.area * (fraction < 1)
+            assert abs((worth * inside).mean() - fraction * light.area) < 4 * error + 1e-9
