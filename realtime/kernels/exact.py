@@ -17,8 +17,8 @@ is even where E < d and logarithmic above. It takes both pairs of singularities,
 foot point. For the lobes cos^16 and cos^64 of half the angle ("hazy", "murky"), whose poles lie at +-i already, d is
 their width.
 
-Every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, in float32 four or
-eight nodes in x if it is short; they leave less than 1e-6. In float64 the panels have 22 nodes, which leave that to
+Every segment takes as many panels of eight nodes as its width in v and its optical depth ask for, in float32 four nodes
+in x if it is short; they leave less than 1e-6. In float64 the panels have 22 nodes, which leave that to
 the power of 22/8, 1e-16, and hold more depth: by the bound below 22 nodes leave 1e-20 of T = 24.
 
 **Panels** of Gauss-Legendre nodes: every ray takes as many as its segment needs. The integral in v is
@@ -63,13 +63,12 @@ length L all of them are therefore r/L or more lengths away, r being the least d
 Gauss's rule converges as fast for every ray with the same r/L (by the theorem above). The exponent changes fastest at
 the end, by sigma_t (1 + s1/r1) a metre.
 
-A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes, or eight, leave no more
-than 1e-6, wherever the segment lies (`realtime.scene.rule_reach` again). Nodes are places s0 + f L, s0 = x0 - foot:
-close to the light, x itself lacks the digits.
+A segment is short where L/r and sigma_t (1 + s1/r1) L are below limits up to which four nodes leave no more than 1e-6,
+wherever the segment lies (`realtime.scene.rule_reach` again). Nodes are places s0 + f L, s0 = x0 - foot: close to the
+light, x itself lacks the digits.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
@@ -82,70 +81,31 @@ from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous, optical_reach
 from realtime.scene.phase import Phase
-from realtime.scene.rule_reach import (
-    FEW_DEPTH,
-    FEW_NODES,
-    MORE_DEPTH,
-    MORE_NODES,
-    PANEL_DEPTH,
-    PANEL_NODES,
-    Reach,
-)
+from realtime.scene.rule_reach import FEW_DEPTH, FEW_NODES, PANEL_DEPTH, PANEL_NODES
 
 
-@dataclass(frozen=True)
-class Rule:
-    """How many nodes a rule has, and which segments it serves."""
+def is_short(geometry: RayGeometry, x0, x1, extinctions, phase: Phase):
+    """Return whether the rule of few nodes serves segments [x0, x1] [m]; False where a value is not finite.
 
-    nodes: int
-    depth: float  #: largest sigma_t (1 + s1/r1) L [1]
-    length: Callable[[Reach], float]  #: largest L/r of a phase function [1]
-
-
-FEW = Rule(FEW_NODES, FEW_DEPTH, lambda reach: reach.few)
-MORE = Rule(MORE_NODES, MORE_DEPTH, lambda reach: reach.more)
-
-
-@dataclass
-class Extent:
-    """How long segments are."""
-
-    square: Any  #: (L/r)^2, infinite at the light
-    depth: Any  #: sigma_t (1 + s1/r1) L of the largest extinction [1]
-
-
-def extent(geometry: RayGeometry, x0, x1, extinctions) -> Extent:
-    """Return how long the segments [x0, x1] [m] are; `extinctions` are those of the medium [1/m].
-
-    Valid for any segment; see `serves` for what is too long.
+    Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
     """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     s1 = s0 + length
     nearest = dr.clip(0, s0, s1)
+    # sigma_t (1 + s1/r1) L of the largest extinction, and (L/r)^2, infinite at the light.
     rate = dr.fma(s1, dr.rsqrt(dr.fma(s1, s1, height_squared)), 1) * reduce(dr.maximum, extinctions)
-    return Extent(dr.square(length) * dr.rcp(dr.fma(nearest, nearest, height_squared)), rate * length)
+    square = dr.square(length) * dr.rcp(dr.fma(nearest, nearest, height_squared))
+    return dr.fma(square, 1 / phase.reach.few**2, dr.square(rate * length) * (1 / FEW_DEPTH**2)) < 1
 
 
-def serves(rule: Rule, segment_extent: Extent, phase: Phase):
-    """Return whether a rule is accurate enough; False where a value is infinite or not a number.
-
-    Length and depth each spoil part of it: by themselves they may reach their limits, together an ellipse.
-    """
-    of_length, of_depth = 1 / rule.length(phase.reach) ** 2, 1 / rule.depth**2
-    return dr.fma(segment_extent.square, of_length, dr.square(segment_extent.depth) * of_depth) < 1
-
-
-def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions, *, rule: Rule):
+def short_segment(geometry: RayGeometry, x0, x1, phase: Phase, extinctions):
     """Return J of short segments for each extinction [1/m].
 
-    `geometry`, `x0`, `x1`: see `realtime.kernels`; `phase`: the phase function; `extinctions`: one or more [1/m];
-    `rule`: how many nodes.
-
-    Valid where the rule `serves`.
+    `geometry`, `x0`, `x1`: see `realtime.kernels`; `phase`: the phase function; `extinctions`: one or more [1/m].
     """
     s0, length, height_squared = x0 - geometry.foot, x1 - x0, dr.square(geometry.height)
     totals = [type(length)(0) for _ in extinctions]
-    for fraction, node_weight in unit_nodes(rule.nodes):
+    for fraction, node_weight in unit_nodes(FEW_NODES):
         step = length * fraction
         s = s0 + step
         square = dr.fma(s, s, height_squared)
@@ -281,21 +241,11 @@ def _by_extinction(geometry: RayGeometry, segment, extinctions, phase: Phase, li
     if not single or light.varies or dr.grad_enabled(segment, (geometry.foot, geometry.height), extinctions, phase):
         return _over_subsegments(geometry, segment, extinctions, phase, light)
     x0, x1 = segment
-    segment_extent = extent(geometry, x0, x1, extinctions)
-
-    def longer(x0, x1):
-        return dr.if_stmt(
-            args=(x0, x1),
-            cond=serves(MORE, segment_extent, phase),
-            true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=MORE),
-            false_fn=lambda x0, x1: _subsegment(geometry, x0, x1, extinctions, phase, light),
-        )
-
     return dr.if_stmt(
         args=(x0, x1),
-        cond=serves(FEW, segment_extent, phase),
-        true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions, rule=FEW),
-        false_fn=longer,
+        cond=is_short(geometry, x0, x1, extinctions, phase),
+        true_fn=lambda x0, x1: short_segment(geometry, x0, x1, phase, extinctions),
+        false_fn=lambda x0, x1: _subsegment(geometry, x0, x1, extinctions, phase, light),
     )
 
 

@@ -31,7 +31,6 @@ LEFT = 1e-6  #: of the integral over any panel in v or x
 LEFT_TURN = 1e-5  #: over panels about the light, of whose sums nobody asks more
 PANEL_NODES, PANEL_DEPTH = 8, 10.5  #: of panels in v
 FEW_NODES, FEW_DEPTH = 4, 2.0  #: of short segments
-MORE_NODES, MORE_DEPTH = 8, 10.0
 TURN_NODES, TURN_DEPTH, TANGENT = 4, 2.2, 0.45  #: of panels about the light, and their largest angle
 
 _MANY = 24
@@ -47,7 +46,6 @@ class Reach:
 
     panel: float  #: in v
     few: float  #: segments of four nodes in x, over their distance from the light
-    more: float  #: of eight
     turn: float  #: tangent of the angle of a panel at the light, over `angle_scale`
 
 
@@ -68,13 +66,9 @@ def reach_of(half: Callable[[Any, Any], Any], ends: tuple[float, float], left: f
         values = half(ArrayXf64((e * e * up).ravel()), ArrayXf64(up.ravel()))
         return np.broadcast_to(np.array(values), e.size).reshape(e.shape)
 
-    def of_segments(nodes: int, depth: float) -> float:
-        return _longest(lambda length: _segment_error(value, ends, length, nodes, depth), left)
-
     return Reach(
         max(_longest(lambda width: _panel_error(value, ends, width), left), _LEAST_PANEL),
-        of_segments(FEW_NODES, FEW_DEPTH),
-        of_segments(MORE_NODES, MORE_DEPTH),
+        _longest(lambda length: _segment_error(value, ends, length), left),
         _longest(lambda turn: _turn_error(value, ends, turn), max(left, LEFT_TURN)),
     )
 
@@ -112,7 +106,7 @@ def _panel_error(value, ends, width: float) -> float:
     return _error(integrand, PANEL_NODES)
 
 
-def _segment_error(value, ends, length: float, nodes: int, depth: float) -> float:
+def _segment_error(value, ends, length: float) -> float:
     first, last = ends
     u = np.sinh(np.linspace(0, math.asinh(15 * max(1 / first, last)), 33))
     across = np.linspace(0, 1, 9)
@@ -124,14 +118,14 @@ def _segment_error(value, ends, length: float, nodes: int, depth: float) -> floa
         s0 = np.concatenate([u, -u - long, -across * fraction])
         whole = np.concatenate([long, long, np.full(len(across), fraction)])
         s1 = s0 + whole
-        rate = depth * math.sin(angle) / (_along(s1) / np.hypot(1, s1) * whole)
+        rate = FEW_DEPTH * math.sin(angle) / (_along(s1) / np.hypot(1, s1) * whole)
 
         def integrand(t, s0=s0, whole=whole, rate=rate):
             s = s0 + whole * t
             e = _along(s)
             return value(e) / (1 + s * s) * np.exp(-rate * (e - _along(s0)))
 
-        worst = max(worst, _error(integrand, nodes))
+        worst = max(worst, _error(integrand, FEW_NODES))
     return worst
 
 
