@@ -59,9 +59,8 @@ from analytic.mie import angular_functions, coefficients, intensities, summed, t
 
 Array = NDArray[np.float64]
 
-#: Wavelengths of the colours [um] and the refractive index of water there (Hale and Querry 1973, interpolated; the
-#: imaginary part is below 2e-8 and left out: droplets of the sizes here lose less than 1e-5 of the light).
-WAVELENGTHS = {"red": 0.65, "green": 0.55, "blue": 0.45}
+#: Refractive index of water by the wavelength [um] (Hale and Querry 1973, interpolated; the imaginary part is below
+#: 2e-8 and left out: droplets of the sizes here lose less than 1e-5 of the light).
 WATER = {0.65: 1.331, 0.55: 1.333, 0.45: 1.337}
 
 #: Sizes in the average up to r_e = 6 um; beyond, fewer in inverse proportion, but at least a quarter. *Measured* at
