@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from reports.commands.list import list_
-from reports.data.reader import meanings, record_types
+from reports.data.records import meanings, record_types
 from reports.tables.drawing import markdown
 from reports.tables.table import Name, Row, Table
 

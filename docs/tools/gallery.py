@@ -24,7 +24,7 @@ from realtime.frame.samples import render_samples
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from reference.storage.files import temporary_folder, write_bytes, write_text
-from reports.data.reader import read_report
+from reports.data.records import read_report
 from reports.machine.environment import MissingError, activate, versions
 from reports.plotting.pictures import error_map, error_scale, preview, tone_curve
 from reports.tables.table import number

@@ -14,7 +14,7 @@ from typing import Any
 
 from analytic.errors import InputError
 from reference.storage.files import write_text
-from reports.data.reader import read_json, read_report
+from reports.data.records import read_json, read_report
 from reports.machine.environment import activate
 
 DOCS = Path(__file__).resolve().parents[1]

@@ -208,7 +208,7 @@ def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) ->
 def _redrawn(path: Path, output: Any, figures: str | None, scenes: list[str], labels: list[str]) -> Report:
     """Draw the page of a report again, into its own folder or as a whole report into another, and its figures."""
     from reference.storage.files import ensure_folder, write_bytes, write_text
-    from reports.data.reader import load_report, named_files
+    from reports.data.records import load_report, named_files
     from reports.page.render import render_page
 
     if len(scenes) > 1:
@@ -340,7 +340,7 @@ def diff(
     time_tolerance
         Relative change of a time that counts as noise on a quiet machine; inf compares no times.
     """
-    from reports.data.reader import read_report
+    from reports.data.records import read_report
     from reports.diff.compare import compare_reports, difference_lines, difference_tables
 
     tolerance = None if time_tolerance == math.inf else time_tolerance

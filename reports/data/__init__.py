@@ -3,6 +3,5 @@
 
 Read in this order:
 
-- `records.py`: the records whose fields are its keys, with units and meanings
-- `reader.py`: makes the records of a file, or says in one line what is wrong with it
+- `records.py`: the records whose fields are its keys, with units and meanings; reading and writing
 """

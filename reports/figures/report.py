@@ -16,8 +16,7 @@ from analytic.errors import InputError, nearest
 from reference.storage.exr import layer as image_layer
 from reference.storage.exr import read_exr
 from reference.storage.files import write_text
-from reports.data.reader import load_report
-from reports.data.records import MethodRow, Report, Scene
+from reports.data.records import MethodRow, Report, Scene, load_report
 from reports.plotting.figure import ENDINGS, has_point, new_figure, save_figure, show_picture, speed_chart
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS

@@ -95,12 +95,10 @@ def speed_chart(scenes: Sequence[Scene], width: float, *, across: int, tallest: 
     return figure
 
 
-def legend_below(
-    figure: "Figure", panel: "Axes", styles: Mapping[str, Mapping[str, Any]], *, columns: int, **how: Any
-) -> None:
-    """Put the markers of labels below a figure; `how` are properties of the legend."""
+def legend_below(figure: "Figure", panel: "Axes", styles: Mapping[str, Mapping[str, Any]], *, columns: int) -> None:
+    """Put the markers of labels below a figure."""
     handles = [panel.plot([], [], **style, linestyle="none", label=short(label))[0] for label, style in styles.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, **how)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
 
 
 def speed_panel(

@@ -23,8 +23,7 @@ from realtime.errors import InputError as MethodError
 from realtime.methods.shader.source import is_shader
 from reference.storage.files import NO_SPACE, ensure_folder
 from reference.storage.kept import Kept, date, fresh_results
-from reports.data.reader import report_text
-from reports.data.records import SCHEMA, Environment, Measured, Report, Settings
+from reports.data.records import SCHEMA, Environment, Measured, Report, Settings, report_text
 from reports.machine.environment import describe_environment, machine, threads
 from reports.machine.opengl import require_opengl
 from reports.machine.own_process import EndedError, in_own_process

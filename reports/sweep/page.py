@@ -19,7 +19,7 @@ from reports.page.chart import svg_text
 from reports.page.filters import drawn, facts, percent, unbroken
 from reports.page.render import page_environment, template_text
 from reports.plotting.figure import file_bytes, legend_below, new_figure, plain_times, short
-from reports.plotting.style import report_styles
+from reports.plotting.style import page_style, report_styles
 from reports.sweep import tables
 from reports.sweep.claims import LEAST, NAMED, SAME, TARGETS, property_words
 from reports.sweep.samples import Numbers, Sample, read_sweep
@@ -116,6 +116,7 @@ def _pictures(said: Summary, keys: list[str]) -> dict[str, str]:
 # Figures: for the page as SVG, for papers as PDF
 
 
+@page_style()
 def distribution(said: Summary) -> "Figure | None":
     """Return how the errors of each configuration are spread over the scenes: a line each, the best above.
 
@@ -140,12 +141,13 @@ def distribution(said: Summary) -> "Figure | None":
         panel.axvline(target, color="#666a72", linewidth=0.8, linestyle=":", zorder=0)
     panel.set_yticks(range(len(shown)), [_with_count(sample) for sample in shown], parse_math=False)
     panel.set(xscale="log", xlabel=ERROR, ylim=(len(shown) - 0.4, -0.6))
-    panel.grid(True, axis="x", which="major", linewidth=0.4, alpha=0.5)
+    panel.grid(False, axis="y")
     panel.spines[["top", "right", "left"]].set_visible(False)
     panel.tick_params(axis="y", length=0)
     return figure
 
 
+@page_style()
 def medians(said: Summary) -> "Figure | None":
     """Return speed against error, each configuration as its median and its quartiles over the scenes.
 
@@ -164,10 +166,8 @@ def medians(said: Summary) -> "Figure | None":
         panel.errorbar(x, y, xerr=[[x - x0], [x1 - x]], yerr=[[y - y0], [y1 - y]], elinewidth=0.8, **style)
     panel.set(xscale="log", yscale="log", xlabel=TIME, ylabel=ERROR)
     plain_times(panel)
-    panel.grid(True, which="major", linewidth=0.4, alpha=0.5)
-    legend_below(
-        figure, panel, {each.label: styles[each.label] for each in shown}, columns=3, fontsize=8, frameon=False
-    )
+    keys = {short(each.label, _LABEL): styles[each.label] for each in shown}
+    legend_below(figure, panel, keys, columns=3)
     return figure
 
 

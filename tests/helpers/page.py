@@ -11,8 +11,7 @@ import numpy as np
 from PIL import Image as Picture
 
 from reference.storage.exr import Image, write_exr
-from reports.data.reader import named_files
-from reports.data.records import Report
+from reports.data.records import Report, named_files
 from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene, settings
 
 WIDTH, HEIGHT = 32, 24

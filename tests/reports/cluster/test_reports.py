@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
 from reports.cluster.connect import connected
-from reports.data.reader import report_text
+from reports.data.records import report_text
 from reports.report.measure import write_report
 from validation.study.configuration import configuration
 from validation.study.study import Checks, Measure, Study

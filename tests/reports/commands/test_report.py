@@ -171,7 +171,7 @@ def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
 def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     import json
 
-    from reports.data.reader import named_files, report_text
+    from reports.data.records import named_files, report_text
     from tests.helpers.page import report_data, small_report, write_report_files
 
     folder = write_report_files(tmp_path / "r")

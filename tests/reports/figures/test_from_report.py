@@ -12,7 +12,7 @@ from PIL import Image as Picture
 
 from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
-from reports.data.reader import load_report
+from reports.data.records import load_report
 from reports.figures import report as figures
 from tests.helpers.reports import (
     checked,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from reports.data.reader import named_files, read_report, report_text
+from reports.data.records import named_files, read_report, report_text
 from reports.report.measure import staged, write_report
 from reports.report.others import other_parts
 from reports.report.scene import file_stems, folder_of, reference_record

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from analytic.errors import InputError
-from reports.data.reader import load_report, read_report
+from reports.data.records import load_report, read_report
 from tests.helpers.page import report_data, write_report_files
 from validation.study.study import standard_study
 
