@@ -80,7 +80,7 @@ def _exported() -> dict[str, tuple[str, str]]:
 
 
 _API = _exported()
-__all__ = ["__version__", "main", *_API]
+__all__ = ["__version__", *_API]
 
 
 def __getattr__(name: str) -> Any:
@@ -92,10 +92,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> Sequence[str]:
     return sorted(__all__)
-
-
-def main() -> None:
-    """Run the `airlight` command."""
-    from reports.commands.start import main as start
-
-    start()

@@ -67,10 +67,9 @@ def write_gltf(path: Path, loaded: LoadedScene) -> dict[str, Any]:
     area_lights = [shape_mesh(light.shape) for light in scene.area]
     names = {medium.name for medium in scene.media}
     bounds = [shape_mesh(shape) for shape in loaded.scene.shapes() if shape.id() in names]
-    document, binary = _document(described, turn, [*opaque, *bounds, *area_lights])
-    data = _container(document, binary)
-    write_bytes(path, data)
     meshes = [*opaque, *bounds, *area_lights]
+    data = _container(*_document(described, turn, meshes))
+    write_bytes(path, data)
     return {
         "path": str(path),
         "triangles": sum(len(mesh.faces) for mesh in meshes),
