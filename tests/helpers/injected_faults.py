@@ -192,7 +192,7 @@ INJECTED = (
     Injected("g", "another g", _of_scene(lambda reference: _media(reference, lambda m: replace(m, phase=_LOBE)))),
     Injected("spot-angle", "cones twice as wide", _of_scene(_scenery(_spots, cone=2.0))),
     Injected("spot-angle", "cones half as wide", _of_scene(_scenery(_spots, cone=0.5))),
-    Injected("light-position", "the light moved", _of_scene(_scenery(_near_lights, moved=(0.07, -0.05, 0.09)))),
+    Injected("light-position", "the light moved", _of_scene(_scenery(_near_lights, moved=((0.07, -0.05, 0.09),)))),
     Injected("fov-axis", "the other field of view", _of_scene(lambda reference: _pixels(reference, _other_axis))),
     Injected("shift", "half a pixel", _of_scene(lambda reference: _pixels(reference, lambda p, size: p - [0.5, 0.5]))),
     Injected("flip", "upside down", values=lambda image: image[::-1]),

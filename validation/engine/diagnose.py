@@ -153,10 +153,9 @@ def diagnose_image(
             "and not of a light itself: fewer do not tell a fault from noise"
         )
     light = light or SceneLight(seen.reference)
-    shape = judged.size[1], judged.size[0]
 
     def begun(kind: str) -> _Attempt:
-        attempt = _Attempt(Predictor(replace(seen, area=kind == "area"), shape, light), kind, progress)
+        attempt = _Attempt(Predictor(replace(seen, area=kind == "area"), light), kind, progress)
         attempt.try_faults(0)
         return attempt
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults of an image, how they change a guess of it, and the features that a scene needs for them.
+"""Changes of a guess of an image, the numbers that are looked for in them, and the features that they need of a scene.
 
 A fault changes a guess, which another fault may have changed before: two faults of different kinds are applied in turn.
-A fault has any number of parameters, each with a range and values to begin with.
+A fault has any number of parameters, each with a range and values to begin with. A diagnosis looks for faults, most of
+them relative to the scene; a fit looks for faults that set a number (`validation.fit.unknowns`).
 """
 
 import math
@@ -30,18 +31,33 @@ _NAMED = {
 }
 
 
+#: How a number is looked for on the whole line: to there, and back.
+SCALES: dict[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
+    "plain": (float, float),
+    "log": (math.log, lambda place: float(np.exp(place))),  # a step is a relative change
+    "tanh": (math.atanh, math.tanh),
+}
+
+
 @dataclass(frozen=True)
-class Parameter:
-    """A number of a fault."""
+class Number:
+    """A number of a guess that is looked for."""
 
     low: float
     high: float
     starts: tuple[float, ...] = (1.0,)
-    logarithmic: bool = False  #: whether it is looked for by its logarithm
-    step: float = (
-        0.0  #: of differences, for what moves paths: each guess costs new ones, and few must do; 0: it does not
-    )
+    scale: str = "plain"  #: one of `SCALES`
+    #: Of differences, for what moves paths: each guess costs new ones, and few must do; 0: it does not.
+    step: float = 0.0
     stride: float = 0.0  #: of the first search along the axes, for what moves shadows; 0: there is none
+
+    def inward(self, value: float) -> float:
+        """Return the place on the whole line where a value is looked for."""
+        return SCALES[self.scale][0](value)
+
+    def outward(self, place: float) -> float:
+        """Return the value that a place on the whole line stands for."""
+        return SCALES[self.scale][1](float(place))
 
 
 @dataclass(frozen=True)
@@ -51,7 +67,7 @@ class Fault:
     name: str
     words: str  #: a sentence with {0}, {1}, .. for the parameters
     change: Change
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[Number, ...] = ()
     begin: Callable[[Predictor, Guess], Sequence[Values]] | None = (
         None  #: values to begin with, by what the image shows
     )

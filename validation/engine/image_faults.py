@@ -9,7 +9,7 @@ import numpy as np
 
 from validation.arrays import Array
 from validation.engine.curves import TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_srgb
-from validation.engine.fault import Change, Fault, Parameter, Values, changed_values, scenery_number, top, undone
+from validation.engine.fault import Change, Fault, Number, Values, changed_values, scenery_number, top, undone
 from validation.engine.prediction import Guess, Predictor
 
 
@@ -32,7 +32,7 @@ def best_corner(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]
     return begin
 
 
-SHIFT = tuple(Parameter(-3.0, 3.0, (0.0,), step=0.1) for _ in range(2))
+SHIFT = tuple(Number(-3.0, 3.0, (0.0,), step=0.1) for _ in range(2))
 
 
 def _other_axis(predictor: Predictor, guess: Guess, p: Values) -> Guess:
@@ -71,7 +71,7 @@ CAMERA = (
         "fov",
         "the image shows {0:.4g} times the width that it should",
         scenery_number("zoom", 5),
-        (Parameter(0.2, 5.0, (0.9, 1.1), logarithmic=True, step=0.01),),
+        (Number(0.2, 5.0, (0.9, 1.1), scale="log", step=0.01),),
         costly=1,
     ),
     Fault(
@@ -85,7 +85,7 @@ CAMERA = (
         "vignette",
         "the image falls off to its corners: a vignette, cos^{0:.3g} of the angle from the camera's axis",
         _vignette,
-        (Parameter(0.0, 100.0, (4.0, 1.0, 12.0)),),
+        (Number(0.0, 100.0, (4.0, 1.0, 12.0)),),
     ),
 )
 
@@ -129,7 +129,7 @@ BRIGHTNESS = Fault(
     "factor",
     "the image is {0:.4g} times as bright as it should be",
     _exposed,
-    (Parameter(1e-9, 1e9, logarithmic=True),),
+    (Number(1e-9, 1e9, scale="log"),),
     begin=_ratio,
     factor=True,
 )
@@ -146,7 +146,7 @@ VALUES = (
         "transfer",
         "the values are encoded by a gamma of {0:.3g}: write linear ones",
         changed_values(gamma),
-        (Parameter(0.2, 5.0, (0.4545, 1.8, 2.2, 2.4), logarithmic=True),),
+        (Number(0.2, 5.0, (0.4545, 1.8, 2.2, 2.4), scale="log"),),
     ),
     Fault("clamp", "the values are cut off at the largest one: write floats", _clamp, needs=("stop",)),
     *(
@@ -157,7 +157,7 @@ VALUES = (
         "black-level",
         "every value has {0:.3g} added: a black level, a veil or light from elsewhere",
         changed_values(lambda radiance, level: radiance + level),
-        (Parameter(1e-30, 1e30, logarithmic=True),),
+        (Number(1e-30, 1e30, scale="log"),),
         begin=_darkest,
     ),
     *(_swapped(order) for order in permutations(range(3)) if order != (0, 1, 2)),

@@ -11,7 +11,7 @@ from validation.arrays import Array
 from validation.engine.fault import (
     Change,
     Fault,
-    Parameter,
+    Number,
     Values,
     changed_layers,
     of_fog_alone,
@@ -57,7 +57,7 @@ def _weighted_median(values: Array, weights: Array) -> float:
 
 def factor_fault(name: str, words: str, change: Change, needs: tuple[str, ...] = ()) -> Fault:
     """Return a fault that multiplies a part of the light."""
-    one = (Parameter(1e-9, 1e9, logarithmic=True),)
+    one = (Number(1e-9, 1e9, scale="log"),)
     return Fault(name, words, change, one, begin=_times(change), needs=needs, factor=True, kind="layers")
 
 
@@ -134,7 +134,7 @@ FOG_AND_SURFACES = (
         "ambient",
         "ambient light with the colour ({0:.3g}, {1:.3g}, {2:.3g}) W/(m^2 sr) is in the fog",
         _ambient,
-        tuple(Parameter(0.0, 1e30) for _ in range(3)),
+        tuple(Number(0.0, 1e30) for _ in range(3)),
         begin=_ambient_colour,
         solved=True,
         single=True,
@@ -154,7 +154,7 @@ FOG_AND_SURFACES = (
         "fog-shift",
         "the fog shows {0:.4g} times the width that surfaces do",
         of_fog_alone(scenery_number("zoom", 5)),
-        (Parameter(0.2, 5.0, (0.95, 1.05), logarithmic=True, step=0.01),),
+        (Number(0.2, 5.0, (0.95, 1.05), scale="log", step=0.01),),
         costly=1,
         single=True,
         needs=("both",),

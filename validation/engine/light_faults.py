@@ -10,7 +10,7 @@ from validation.arrays import Array
 from validation.engine.fault import (
     Change,
     Fault,
-    Parameter,
+    Number,
     Values,
     of_fog_alone,
     of_surfaces_alone,
@@ -39,7 +39,7 @@ def _ranges(predictor: Predictor, guess: Guess) -> Sequence[Values]:
 def at_position(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     """Return a guess with the first light off by a vector."""
     x, y, z = (short(value) for value in p)
-    return replace(guess, scenery=replace(guess.scenery, moved=(x, y, z)))
+    return replace(guess, scenery=replace(guess.scenery, moved=((x, y, z),)))
 
 
 def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
@@ -50,11 +50,11 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
     if predictor.reference.lights[0].axis is not None:
         return at_position(predictor, guess, p)
     held = at_position(predictor, guess, at)
-    x, y, z = (value - before for value, before in zip(p, held.scenery.moved, strict=True))
+    x, y, z = (value - before for value, before in zip(p, held.scenery.moved[0], strict=True))
     return replace(held, fog=held.fog.with_entry("moved", 0, (x, y, z)))
 
 
-PLACE = tuple(Parameter(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))
+PLACE = tuple(Number(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))
 
 LIGHTS = (
     Fault("no-shadow", "nothing casts a shadow", with_scenery(shadows=False), needs=("shapes",)),
@@ -82,7 +82,7 @@ LIGHTS = (
             "light-range",
             f"lights have a range: {words} {{0:.4g}} m",
             _window(change),
-            (Parameter(1e-3, 1e6, logarithmic=True),),
+            (Number(1e-3, 1e6, scale="log"),),
             begin=_ranges,
             needs=("lamps",),
         )
@@ -105,7 +105,7 @@ LIGHTS = (
         "spot-angle",
         "the angles of spots are {0:.4g} times what they should be",
         scenery_number("cone"),
-        (Parameter(0.2, 4.0, (0.8, 1.25), logarithmic=True, step=0.02),),
+        (Number(0.2, 4.0, (0.8, 1.25), scale="log", step=0.02),),
         costly=1,
         needs=("spots",),
     ),
@@ -120,7 +120,7 @@ LIGHTS = (
         "spot-falloff",
         "spots fall off as Blender's with a blend of {0:.3g}, which its own is 0.15: smoothly by the cosine",
         scenery_number("blend"),
-        (Parameter(0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
+        (Number(0.01, 1.0, (0.15, 0.5, 1.0), step=0.01),),
         costly=1,
         needs=("spots",),
     ),
@@ -128,7 +128,7 @@ LIGHTS = (
         "light-radius",
         "point lights are spheres of the radius {0:.3g} m",
         scenery_number("radius"),
-        (Parameter(0.0, 10.0, (0.05, 0.2, 0.5), step=0.01),),
+        (Number(0.0, 10.0, (0.05, 0.2, 0.5), step=0.01),),
         costly=2,
         needs=("point lights",),
     ),

@@ -15,7 +15,7 @@ from validation.engine.curves import from_srgb, to_srgb
 from validation.engine.fault import (
     Change,
     Fault,
-    Parameter,
+    Number,
     Values,
     changed_fog,
     changed_layers,
@@ -26,7 +26,7 @@ from validation.engine.prediction import Guess, Layers, Predictor
 from validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
 
 _FACTOR = (0.5, 0.7, 1.4, 2.0)
-_SHIFT = Parameter(-100.0, 100.0, (-10.0, -2.0, -0.5, 0.5, 2.0, 10.0))  # of heights [m]
+_SHIFT = Number(-100.0, 100.0, (-10.0, -2.0, -0.5, 0.5, 2.0, 10.0))  # of heights [m]
 _USUAL_NEAR = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)  # of cameras in engines and modelling programs [m]
 
 
@@ -182,13 +182,13 @@ MEDIUM = (
         "extinction",
         "the extinction is {0:.4g} times what it should be",
         _optics(lambda sigma_t, albedo, factor: (sigma_t * factor, albedo)),
-        (Parameter(1e-3, 1e3, (*_FACTOR, 0.1, 10.0), logarithmic=True),),
+        (Number(1e-3, 1e3, (*_FACTOR, 0.1, 10.0), scale="log"),),
     ),
     Fault(
         "absorption",
         "the absorption is {0:.4g} times what it should be, at the same scattering",
         _optics(_absorption),
-        (Parameter(0.0, 50.0, (0.0, 0.5, 2.0, 5.0)),),
+        (Number(0.0, 50.0, (0.0, 0.5, 2.0, 5.0)),),
         needs=("absorption",),
     ),
     Fault(
@@ -225,14 +225,14 @@ MEDIUM = (
         "g",
         "g of the phase function is {0:.4g}",
         lambda predictor, guess, p: _lobes(lambda g: float(p[0]))(predictor, guess, ()),
-        (Parameter(-0.99, 0.99, (-0.5, 0.0, 0.4, 0.8)),),
+        (Number(-0.99, 0.99, (-0.5, 0.0, 0.4, 0.8)),),
         needs=("lobes",),
     ),
     Fault(
         "g",
         "the phase function is Henyey and Greenstein's with g {0:.4g}, not isotropic",
         lambda predictor, guess, p: _every_phase(float(p[0]))(predictor, guess, ()),
-        (Parameter(-0.99, 0.99, (-0.5, 0.4, 0.8)),),
+        (Number(-0.99, 0.99, (-0.5, 0.4, 0.8)),),
         needs=("fog", "isotropy"),
     ),
     *(
@@ -271,7 +271,7 @@ MEDIUM = (
         "unit-length",
         "lengths are {0:.4g} times what they should be: another unit of length",
         _unit,
-        (Parameter(1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), logarithmic=True),),
+        (Number(1e-4, 1e4, (0.01, 100.0, 0.1, 10.0, 0.3048, 3.2808, 0.001, 1000.0), scale="log"),),
         needs=("lamps",),
     ),
     # Where the fog before it is dark, a near plane is a factor with all digits of one that engines have.
@@ -288,7 +288,7 @@ MEDIUM = (
         "near-plane",
         "the medium is missing up to {0:.4g} m before the camera: its near plane",
         _between(False, "near"),
-        (Parameter(0.0, np.inf, (0.05, 0.2, 0.5, 1.0)),),
+        (Number(0.0, np.inf, (0.05, 0.2, 0.5, 1.0)),),
         needs=("no bounds",),
     ),
     *(
@@ -296,7 +296,7 @@ MEDIUM = (
             "fog-end",
             f"the fog ends {{0:.3g}} m {words}: beyond, nothing is scattered or attenuated",
             _between(spherical, "far"),
-            (Parameter(1e-3, np.inf, logarithmic=True),),
+            (Number(1e-3, np.inf, scale="log"),),
             begin=_depths,
             costly=1,
             needs=("no bounds", "fog"),
@@ -325,7 +325,7 @@ MEDIUM = (
         "height-fog",
         "the density falls with height, to 1/e in {0:.3g} m, and is {1:.3g} times what it should be at the camera",
         _falling,
-        (Parameter(1e-2, 1e4, logarithmic=True), Parameter(1e-2, 1e2, logarithmic=True)),
+        (Number(1e-2, 1e4, scale="log"), Number(1e-2, 1e2, scale="log")),
         begin=_heights,
         single=True,
         needs=("no bounds", "even fog"),
@@ -334,7 +334,7 @@ MEDIUM = (
         "homogeneous",
         "the fog is homogeneous, of the extinction {0:.4g} 1/m: its density does not fall with height",
         _even,
-        (Parameter(1e-5, 1e3, logarithmic=True),),
+        (Number(1e-5, 1e3, scale="log"),),
         begin=_densities,
         single=True,
         needs=("height fog",),
@@ -354,7 +354,7 @@ MEDIUM = (
         "scale-height",
         "scale heights are {0:.4g} times what they should be",
         _stretched(lambda h, factor: h * factor),
-        (Parameter(1e-3, 1e3, _FACTOR, logarithmic=True),),
+        (Number(1e-3, 1e3, _FACTOR, scale="log"),),
         needs=("height fog",),
     ),
     Fault(
@@ -368,7 +368,7 @@ MEDIUM = (
         "height-fog",
         "scale heights are {0:.4g} times what they should be, and bases {1:+.4g} m higher",
         _layers(lambda layer, factor, shift: Layer(layer.sigma_t, layer.base + shift, layer.scale_height * factor)),
-        (Parameter(1e-3, 1e3, logarithmic=True), _SHIFT),
+        (Number(1e-3, 1e3, scale="log"), _SHIFT),
         begin=lambda predictor, guess: [(factor, shift) for factor in (0.5, 1.0, 2.0) for shift in (-1.0, 0.0, 1.0)],
         single=True,
         needs=("height fog",),
@@ -377,7 +377,7 @@ MEDIUM = (
         "multiple",
         "{0:.3g} times the light of multiple scattering is included",
         _multiple(of_surfaces=False),
-        (Parameter(0.0, 3.0),),
+        (Number(0.0, 3.0),),
         costly=1,
         needs=("fog", "more light"),
     ),
@@ -385,7 +385,7 @@ MEDIUM = (
         "multiple",
         "{0:.3g} times the light of higher orders is included, between surfaces and of the medium",
         _multiple(of_surfaces=True),
-        (Parameter(0.0, 3.0),),
+        (Number(0.0, 3.0),),
         costly=1,
         needs=("all light", "more light"),
     ),

@@ -13,13 +13,12 @@ from reference.monte_carlo.batches import LAYERS
 from reference.monte_carlo.volpath import volpath_batch
 from reference.scene.read import ReferenceLight, ReferenceScene
 from validation.arrays import Array, Bools, Index
-from validation.engine.seen import Seen, relative_errors
+from validation.engine.seen import APART, Seen, relative_errors
 from validation.fog_model.radiance import Fog, FogModel, scene_fog
 from validation.fog_model.view import Ends, View
 
 Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
 
-APART = 2  #: pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours
 _FEW_RAYS = 800  # with which faults that move paths are told apart
 _MANY_TRIANGLES = 20_000  # of which exact paths cost much: few pixels are looked at, and faults are searched by others
 _STEPS = 64  # shadow rays that find the lit parts of a ray there
@@ -37,7 +36,7 @@ class Scenery:
     shadows: bool = True
     offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
     zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
-    moved: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: of the first point or spot light [m]
+    moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)  #: of the first point and spot lights [m]
     cone: float = 1.0  #: factor on the angles of spots
     edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
     radius: float = 0.0  #: of spheres in the place of point lights [m]
@@ -52,8 +51,8 @@ class Scenery:
         """Return the point and spot lights of a scene as this scenery has them."""
         lights = []
         for number, light in enumerate(reference.lights):
-            if number == 0 and any(self.moved):
-                light = replace(light, position=light.position + np.array(self.moved))
+            if number < len(self.moved):
+                light = replace(light, position=light.position + np.array(self.moved[number]))
             if light.axis is not None and self.cone != 1:
                 cutoff, beam = (min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam))
                 light = replace(light, cutoff=cutoff, beam=beam)
@@ -119,9 +118,7 @@ class SceneLight:
     def view(self, seen: Seen, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
         key = "view", scenery.offset, scenery.zoom, _sight(seen)
-        return self._once(
-            key, lambda: seen.view(most=seen.rays, apart=APART, **scenery.where), lambda v: 40 * v.distance.size
-        )
+        return self._once(key, lambda: seen.view(**scenery.where), lambda v: 40 * v.distance.size)
 
     def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
         """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces; `ends`: of a fog."""
@@ -160,13 +157,17 @@ class Predictor:
     """Predicts images."""
 
     seen: Seen
-    shape: tuple[int, int]
     light: SceneLight
 
     @property
     def reference(self) -> ReferenceScene:
         """The scene."""
         return self.seen.reference
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the image [pixels]."""
+        return self.reference.height, self.reference.width
 
     @property
     def fog(self) -> Fog:
@@ -181,12 +182,12 @@ class Predictor:
     @cached_property
     def few(self) -> "Predictor":
         """One with fewer pixels."""
-        return Predictor(replace(self.seen, rays=_FEW_RAYS), self.shape, self.light)
+        return Predictor(replace(self.seen, rays=_FEW_RAYS), self.light)
 
     @cached_property
     def coarse(self) -> "Predictor":
         """One with fewer pixels, and where exact paths cost much with shadow rays."""
-        return Predictor(replace(self.few.seen, steps=_STEPS), self.shape, self.light) if self.many else self.few
+        return Predictor(replace(self.few.seen, steps=_STEPS), self.light) if self.many else self.few
 
     @cached_property
     def view(self) -> View:

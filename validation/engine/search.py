@@ -10,14 +10,15 @@ leaves and ends at what the search leaves.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares, minimize_scalar
 
 from validation.arrays import Array, Bools
-from validation.engine.fault import Fault, Parameter, Values
+from validation.engine.fault import Fault, Number, Values
 from validation.engine.prediction import Guess, Predictor
 
 _LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
@@ -32,6 +33,7 @@ _LOST = 0.5  # fraction of the loss that is left of what is not this fault, afte
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
 _SMALL = 0.02  # of the step of differences: a change that is none
 _NEAR = 3  # steps of differences: how far few paths are off at most
+_FARTHEST = 10.0  # a factor of 22 000, or an artanh g of 10
 _STEP = 1e-4  # of differences, of a logarithm or in units of the parameter, where no paths move
 
 
@@ -73,7 +75,7 @@ def explain(
         predictor = coarse
     searches = [_Search(each, tuple(faults)) for each in sought]
     search = searches[0]
-    parameters = search.parameters
+    parameters = search.numbers
     starts = [tuple(value for part in near for value in part)] if near else _starts(sought[0], faults)
     best = starts[0]
     if all(fault.solved or not fault.parameters for fault in faults):
@@ -84,16 +86,16 @@ def explain(
         on_a_line = len(parameters) == 1
         moves = any(parameter.step for parameter in parameters)
         followed = 1 if moves else _BEGUN if on_a_line else _BEGUN_BY_STEPS
-        places = [search.inward(start) for start in starts[:followed]]
+        places = [inward(parameters, start) for start in starts[:followed]]
         if any(parameter.stride for parameter in parameters) and not near:
             places = [search.along_axes(place, scale) for place in places]
         for turn, search in enumerate(searches):
-            scale = scale if turn == 0 else search.scale(search.outward(places[0]), fine)
+            scale = scale if turn == 0 else search.scale(outward(parameters, places[0]), fine)
             if on_a_line:
                 places = [search.on_line(place, scale, fine, moves and turn > 0) for place in places]
             else:
                 places = [search.by_steps(place, scale, fine, moves and turn > 0) for place in places]
-        best = min((search.outward(place) for place in places), key=lambda values: search.loss(values, scale))
+        best = min((outward(parameters, place) for place in places), key=lambda values: search.loss(values, scale))
     guess = guess_of(predictor, faults, best)
     errors = predictor.errors(guess)
     error = float(np.abs(errors).mean())
@@ -113,12 +115,55 @@ def _coarse(predictor: Predictor, faults: Sequence[Fault]) -> Predictor:
     return predictor.coarse if moves else predictor
 
 
-def guess_of(predictor: Predictor, faults: Sequence[Fault], values: Values) -> Guess:
-    """Return the guess for some faults with these values."""
-    guess = Guess(predictor.fog)
-    for fault, part in zip(faults, _parted(faults, values), strict=True):
-        guess = fault.change(predictor, guess, part)
+def guess_of(
+    predictor: Predictor,
+    faults: Sequence[Fault],
+    values: Values,
+    *,
+    at: Values | None = None,
+    guess: Guess | None = None,
+) -> Guess:
+    """Return the guess for some faults with these values.
+
+    `at`: values for which paths are found, and held for others by the faults that can do with that; `guess`: what the
+    faults change; the scene as it is by default.
+    """
+    guess = guess or Guess(predictor.fog)
+    olds = _parted(faults, values if at is None else at)
+    for fault, part, old in zip(faults, _parted(faults, values), olds, strict=True):
+        if at is None or fault.held is None:
+            guess = fault.change(predictor, guess, part)
+        else:
+            guess = fault.held(predictor, guess, part, old)
     return guess
+
+
+def inward(numbers: Sequence[Number], values: Sequence[float]) -> Array:
+    """Return the places on the whole line where values are looked for, (n,)."""
+    return np.array([number.inward(value) for number, value in zip(numbers, values, strict=True)])
+
+
+def outward(numbers: Sequence[Number], place: Sequence[float] | Array) -> Values:
+    """Return the values that places on the whole line stand for."""
+    return tuple(number.outward(each) for number, each in zip(numbers, place, strict=True))
+
+
+def least_squares_place(
+    residuals: Callable[[Array], Array],
+    slopes: Callable[[Array], Array],
+    numbers: Sequence[Number],
+    start: Array,
+    **how: Any,
+) -> Array:
+    """Return the place with the least sum of squares, or of another loss of SciPy's, in the ranges of the numbers.
+
+    A logarithm, or an artanh, does not go farther than `_FARTHEST` from where it starts: an image that needs more tells
+    nothing, and an unbounded step may overflow.
+    """
+    reach = np.array([math.inf if number.scale == "plain" else _FARTHEST for number in numbers])
+    low, high = (inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high"))
+    ends = np.maximum(low, start - reach), np.minimum(high, start + reach)
+    return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
 
 
 def usual_size(errors: Array) -> float:
@@ -127,43 +172,35 @@ def usual_size(errors: Array) -> float:
 
 
 class _Search:
-    """The errors of guesses, by the values of all parameters."""
+    """The errors of guesses, by the values of all numbers."""
 
     def __init__(self, predictor: Predictor, faults: tuple[Fault, ...]) -> None:
         self.predictor, self.faults = predictor, faults
-        self.parameters = tuple(parameter for fault in faults for parameter in fault.parameters)
+        self.numbers = tuple(number for fault in faults for number in fault.parameters)
         self.known: dict[Values, Array] = {}
-
-    def guess(self, values: Values) -> Guess:
-        return guess_of(self.predictor, self.faults, values)
 
     def errors(self, values: Values) -> Array:
         if values not in self.known:
-            self.known[values] = self.predictor.errors(self.guess(values))
+            self.known[values] = self.predictor.errors(guess_of(self.predictor, self.faults, values))
         return self.known[values]
 
     def loss(self, values: Values, scale: float) -> float:
         return float(np.mean(np.log1p((self.errors(values) / scale) ** 2)))
 
+    def loss_at(self, place: Array, scale: float) -> float:
+        return self.loss(outward(self.numbers, place), scale)
+
     def scale(self, values: Values, fine: bool) -> float:
-        left = self.errors(values)[self.predictor.lit(self.guess(values))]
+        left = self.errors(values)[self.predictor.lit(guess_of(self.predictor, self.faults, values))]
         return max(usual_size(left), _LEAST_SCALE if fine else _LEAST_COARSE)
-
-    def inward(self, values: Values) -> Array:
-        pairs = zip(self.parameters, values, strict=True)
-        return np.array([math.log(value) if parameter.logarithmic else value for parameter, value in pairs])
-
-    def outward(self, place: Array) -> Values:
-        pairs = zip(self.parameters, place, strict=True)
-        return tuple(math.exp(value) if parameter.logarithmic else float(value) for parameter, value in pairs)
 
     def on_line(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
         """Return the best value of one parameter; `near`: it is known except for a few steps of differences."""
-        (parameter,) = self.parameters
-        low, high = (float(self.inward((end,))[0]) for end in (parameter.low, parameter.high))
+        (parameter,) = self.numbers
+        low, high = (parameter.inward(end) for end in (parameter.low, parameter.high))
 
         def loss(value: float) -> float:
-            return self.loss(self.outward(np.array([value])), scale)
+            return self.loss_at(np.array([value]), scale)
 
         place = np.clip(place, low, high)  # an image that is nearly black may begin beyond an end
         ends = _between(parameter, float(place[0]), low, high)
@@ -178,8 +215,8 @@ class _Search:
 
         Where they have gained, diagonals are tried too: a shadow stays where a light moves towards what casts it.
         """
-        longest = strides = np.array([parameter.stride for parameter in self.parameters])
-        least = begun = self.loss(self.outward(place), scale)
+        longest = strides = np.array([parameter.stride for parameter in self.numbers])
+        least = begun = self.loss_at(place, scale)
         axes = np.eye(len(place))
         diagonals = [a + sign * b for n, a in enumerate(axes) for b in axes[n + 1 :] for sign in (1, -1)]
         for _ in range(_STRIDES):
@@ -189,7 +226,7 @@ class _Search:
             for moves in (axes, diagonals) if least < _LITTLE * begun else (axes,):
                 for move in strides * moves:
                     for trial in (place + move, place - move):
-                        reached = self.loss(self.outward(trial), scale)
+                        reached = self.loss_at(trial, scale)
                         if reached < least:
                             place, least = trial, reached
                             break
@@ -203,17 +240,17 @@ class _Search:
 
     def by_steps(self, place: Array, scale: float, fine: bool, near: bool = False) -> Array:
         """Return the end of a few steps of Gauss and Newton with Cauchy's weights, halved while they make it worse."""
-        low, high = (self.inward(tuple(getattr(p, end) for p in self.parameters)) for end in ("low", "high"))
-        steps = np.array([parameter.step or _STEP for parameter in self.parameters])
-        least = self.loss(self.outward(place), scale)
+        low, high = (inward(self.numbers, [getattr(p, end) for p in self.numbers]) for end in ("low", "high"))
+        steps = np.array([parameter.step or _STEP for parameter in self.numbers])
+        least = self.loss_at(place, scale)
         for _ in range(_TURNS_LAST if near else _TURNS if fine else _TURNS_COARSE):
-            left = self.errors(self.outward(place)).ravel()
+            left = self.errors(outward(self.numbers, place)).ravel()
             slopes = self._slopes(place, left, steps)
             weights = 1 / (1 + (left / scale) ** 2)
             move = -np.linalg.lstsq(slopes * np.sqrt(weights)[:, None], left * np.sqrt(weights), rcond=1e-10)[0]
             for _ in range(4 if fine else 2):
                 trial = np.clip(place + move, low, high)
-                reached = self.loss(self.outward(trial), scale)
+                reached = self.loss_at(trial, scale)
                 if reached < least:
                     break
                 move = 0.5 * move
@@ -223,14 +260,14 @@ class _Search:
             place, least = trial, reached
             if small:
                 break
-            steps = np.where([p.step > 0 for p in self.parameters], 0.6 * steps, steps)
+            steps = np.where([p.step > 0 for p in self.numbers], 0.6 * steps, steps)
         return place
 
     def _slopes(self, place: Array, left: Array, steps: Array) -> Array:
-        at = self.outward(place)
+        at = outward(self.numbers, place)
         columns = []
         for step, axis in zip(steps, np.eye(len(place)), strict=True):
-            values = self.outward(place + step * axis)
+            values = outward(self.numbers, place + step * axis)
             columns.append((self._held_errors(values, at).ravel() - left) / step)
         return np.stack(columns, axis=1)
 
@@ -238,20 +275,14 @@ class _Search:
         """Return the errors with paths held where they are, for faults that can do with that."""
         if not any(fault.held for fault in self.faults):
             return self.errors(values)
-        guess = Guess(self.predictor.fog)
-        for fault, part, old in zip(self.faults, _parted(self.faults, values), _parted(self.faults, at), strict=True):
-            held = fault.held
-            guess = (
-                fault.change(self.predictor, guess, part) if held is None else held(self.predictor, guess, part, old)
-            )
-        return self.predictor.errors(guess)
+        return self.predictor.errors(guess_of(self.predictor, self.faults, values, at=at))
 
 
-def _between(parameter: Parameter, inner: float, low: float, high: float) -> tuple[float, float]:
+def _between(parameter: Number, inner: float, low: float, high: float) -> tuple[float, float]:
     """Return the ends of a search on the line: a start's are the starts beside it, others have some room."""
-    step = 0.7 if parameter.logarithmic else max(0.3 * abs(inner), 0.1)
+    step = 0.7 if parameter.scale == "log" else max(0.3 * abs(inner), 0.1)
     ends = inner - step, inner + step
-    if not parameter.logarithmic and inner in parameter.starts:
+    if parameter.scale != "log" and inner in parameter.starts:
         below, above = ([start for start in parameter.starts if sign * (start - inner) > 0] for sign in (-1, 1))
         ends = max(below, default=low), min(above, default=high if math.isfinite(high) else ends[1])
     return max(low, ends[0]), min(high, ends[1])

@@ -3,7 +3,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -27,6 +27,9 @@ Found = TypeVar("Found")  #: what an attempt at an image is
 
 PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre, or the mean over its area
 
+#: Pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours.
+APART = 2
+
 _MOST_RAYS = 3200  # every pixel of an image of 64 x 48
 _FEWEST = 64  # pixels, whatever rays they need
 _FEW = 4  # pixels that values may be cut off in, and that are looked at: chance may meet none of them
@@ -47,26 +50,24 @@ class Seen:
     used: Bools  #: which pixels may take part, (pixels,)
     area: bool = False  #: whether a pixel is a mean over its area, or the value at its centre
     samples: int = SAMPLES  #: that stand for an area light, see `needed_samples`
-    rays: int = _MOST_RAYS  #: that a diagnosis looks at, at most
+    rays: int = _MOST_RAYS  #: that are looked at, at most
+    apart: int = APART  #: pixels between those that are looked at in pairs, where not all are; 0: each by itself
     steps: int = 0  #: shadow rays that find the lit parts of a ray; 0: they are exact
 
-    def view(
-        self, *, most: int, apart: int = 0, offset: tuple[float, float] = (0.0, 0.0), zoom: float = 1.0, seed: int = 0
-    ) -> View:
+    def view(self, **where: Any) -> View:
         """Return the rays of the pixels that take part: one at random of each of as many equal parts of the image.
 
-        `most`: how many rays are enough; `apart`: where not all pixels take part, they are chosen as pairs so far apart
-        in a row; 0: each by itself [pixels]; `offset`, `zoom`: see `validation.fog_model.view.view_of`.
+        `where`: `offset` and `zoom` of `validation.fog_model.view.view_of`.
         """
-        pixels, count = np.flatnonzero(self.used), self.pixels_of_rays(most)
+        pixels, count = np.flatnonzero(self.used), self.most_pixels
         if len(pixels) > count:
-            places = (np.arange(count) + np.random.default_rng(seed).random(count)) * (len(pixels) / count)
+            places = (np.arange(count) + np.random.default_rng(0).random(count)) * (len(pixels) / count)
             pixels = np.unique(pixels[np.minimum(places.astype(np.int64), len(pixels) - 1)])
-            if apart:
-                pixels = self._with_partners(pixels[::2], apart)
+            if self.apart:
+                pixels = self._with_partners(pixels[::2])
             pixels = np.union1d(pixels, self.cut_off[_evenly(len(self.cut_off), count / int(self.used.sum()))])
         side = _SIDE if self.area else 0
-        return view_of(self.reference, pixels, rays_per_side=side, offset=offset, zoom=zoom, steps=self.steps)
+        return view_of(self.reference, pixels, rays_per_side=side, steps=self.steps, **where)
 
     @cached_property
     def cut_off(self) -> Index:
@@ -78,20 +79,21 @@ class Seen:
         parts = {"airlight": self.holds != SURFACE, "surface": self.holds != AIRLIGHT, "samples": self.samples}
         return FogModel(view, scattering_paths(view, lights, **(parts | how)))
 
-    def pixels_of_rays(self, most: int) -> int:
-        """Return how many pixels so many rays allow, or the fewest that are looked at."""
-        return max(_FEWEST, most // ((_SIDE**2 if self.area else 1) * (self.samples if self.reference.area else 1)))
+    @property
+    def most_pixels(self) -> int:
+        """How many pixels the rays allow, or the fewest that are looked at."""
+        return max(
+            _FEWEST, self.rays // ((_SIDE**2 if self.area else 1) * (self.samples if self.reference.area else 1))
+        )
 
     def held(self, layers: Array) -> Array:
         """Return the light that the image holds of airlight and surfaces, (2, m, 3)."""
         return np.asarray(layers[0] if self.holds == AIRLIGHT else layers[1] if self.holds == SURFACE else sum(layers))
 
-    def _with_partners(self, pixels: Index, apart: int) -> Index:
+    def _with_partners(self, pixels: Index) -> Index:
         """Return pixels, and those to the right of them that can take part too."""
-        partners = pixels + apart
-        partners = partners[
-            (pixels % self.reference.width + apart < self.reference.width) & (partners < len(self.used))
-        ]
+        width, partners = self.reference.width, pixels + self.apart
+        partners = partners[(pixels % width + self.apart < width) & (partners < len(self.used))]
         return np.asarray(np.union1d(pixels, partners[self.used[partners]]), dtype=np.int64)
 
 
@@ -237,15 +239,6 @@ def needed_samples(reference: ReferenceScene) -> int:
             break
         samples, values = 2 * samples, finer
     return samples
-
-
-def at_places(seen: Seen, places: dict[int, tuple[float, float, float]]) -> Seen:
-    """Return an image of a scene with point or spot lights, by number, at other places [m]."""
-    lights = tuple(
-        replace(light, position=np.array(places[number])) if number in places else light
-        for number, light in enumerate(seen.reference.lights)
-    )
-    return replace(seen, reference=replace(seen.reference, lights=lights))
 
 
 def scene_of_size(scene: str, size: tuple[int, int], path: str | os.PathLike[str]) -> LoadedScene:

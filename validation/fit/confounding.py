@@ -98,14 +98,12 @@ class Confounded:
         return [*lines, f"Way out: {self.way_out}."]
 
 
-def confounded(
-    group: Group, unknowns: Sequence[Unknown], inner: Mapping[int, float], lengths: Mapping[int, Array], holds: str
-) -> Confounded:
+def confounded(group: Group, unknowns: Sequence[Unknown], inner: Array, lengths: Array, holds: str) -> Confounded:
     """Return the products that an image tells of a group, from the numbers on the whole line and their intervals."""
     names = {number: unknowns[number].name for number in group.members}
     products: dict[str, tuple[float, float, float | None]] = {}
     for kept, powers in group.powers.items():
-        if all(unknowns[number].scale == "log" for number in (kept, *powers)):
+        if all(unknowns[number].number.scale == "log" for number in (kept, *powers)):
             words = [names[kept], *(_power(names[number], power) for number, power in powers.items())]
             middle = inner[kept] + sum(power * inner[number] for number, power in powers.items())
             low, high = (float(np.exp(middle + float(length))) for length in lengths[kept])

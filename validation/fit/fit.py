@@ -10,22 +10,16 @@ import numpy as np
 
 from analytic.clock import stopwatch
 from analytic.errors import InputError
+from reference.scene.read import ReferenceScene
 from reference.storage.exr import Image
 from validation.arrays import Array, Bools, Progress
 from validation.engine.judged_layer import judged_layer
-from validation.engine.seen import (
-    Seen,
-    at_places,
-    decide_pixel,
-    pixel_kinds,
-    relative_errors,
-    seen_image,
-    stopped,
-)
+from validation.engine.prediction import Predictor, SceneLight
+from validation.engine.seen import decide_pixel, pixel_kinds, relative_errors, seen_image, stopped
 from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
 from validation.fit.solve import (
     SIGMAS,
-    ImageModel,
+    Model,
     Solution,
     best_start,
     interval_ends,
@@ -34,7 +28,6 @@ from validation.fit.solve import (
     weighted_fit,
 )
 from validation.fit.unknowns import Unknown, read_unknowns
-from validation.fog_model.radiance import scene_fog
 from validation.metrics.errors import FLOOR
 from validation.scenes.loading import LoadedScene
 
@@ -43,6 +36,7 @@ _STILL = 1e-6  # of the distance of a light from the camera: it does not move an
 _STILL_IN_NOISE = 0.02  # of a standard error: the interval would not show it
 _KNOWN = 1e-6  # a standard error that is always there: scenes are read, and images written, in float32
 _EXACT = 1e-5  # mean relative residual at which pixels are centres beyond doubt
+_MANY_RAYS = 20_000  # that are looked at: more say nothing new of few numbers
 _FEW_RAYS = 3000  # on which starts are compared
 _FEWER = 4
 _FEWEST = 16  # pixels
@@ -133,8 +127,9 @@ def fit_image(
     kinds = pixel_kinds(image, pixel)
     judged = judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene, mask=mask)
-    unknowns = read_unknowns(parameters, seen.reference, scene_fog(seen.reference), starts or {})
-    seen = replace(seen, used=seen.used & ~stopped(np.where(seen.used[:, None], seen.values, np.nan)).any(axis=1))
+    unknowns = read_unknowns(parameters, seen.reference, starts or {})
+    stops = stopped(np.where(seen.used[:, None], seen.values, np.nan)).any(axis=1)
+    seen = replace(seen, used=seen.used & ~stops, rays=_MANY_RAYS, apart=0)
     fewest = max(_FEWEST, 4 * len(unknowns))
     if int(seen.used.sum()) < fewest:
         raise InputError(
@@ -142,14 +137,17 @@ def fit_image(
             f"{fewest}, finite, not cut off at the brightest value, and left by the mask"
         )
 
-    def solved(kind: str) -> tuple[ImageModel, tuple[Group, ...], Solution, tuple[Unknown, ...]]:
+    def solved(kind: str) -> _Solved:
         tell = None if progress is None else _stage(progress, kinds.index(kind), len(kinds))
-        return _solved(replace(seen, area=kind == "area"), unknowns, tell)
+        return _solved(Predictor(replace(seen, area=kind == "area"), SceneLight(seen.reference)), unknowns, tell)
 
-    kind, (model, groups, solution, unknowns) = decide_pixel(
-        kinds, solved, lambda found: [_wrong(each[2]) for each in found], lambda each: _wrong(each[2]) < _EXACT
+    kind, found = decide_pixel(
+        kinds,
+        solved,
+        lambda found: [_wrong(each.solution) for each in found],
+        lambda each: _wrong(each.solution) < _EXACT,
     )
-    fit = _fit((loaded.name, path, judged.holds, kind.pixel), model, groups, solution, unknowns)
+    fit = _fit((loaded.name, path, judged.holds, kind.pixel), unknowns, found)
     return replace(fit, seconds=took().seconds, failures=wrong)
 
 
@@ -157,71 +155,44 @@ def _stage(progress: Progress, number: int, count: int) -> Progress:
     return lambda fraction, what: progress((number + fraction) / count, what)
 
 
-def _solved(
-    seen: Seen, unknowns: Sequence[Unknown], progress: Progress | None
-) -> tuple[ImageModel, tuple[Group, ...], Solution, tuple[Unknown, ...]]:
+@dataclass(frozen=True)
+class _Solved:
+    model: Model  #: of the parameters that are free, with the others held
+    free: Bools  #: which are free, (parameters,)
+    groups: tuple[Group, ...]
+    solution: Solution
+
+
+def _solved(predictor: Predictor, unknowns: tuple[Unknown, ...], progress: Progress | None) -> _Solved:
     """Solve for parameters; where lights move, with lit intervals found again in every round."""
-    unknowns = tuple(unknowns)
-    if any(unknown.moves and unknown.start != unknown.scene for unknown in unknowns):
-        seen, unknowns = _moved(seen, unknowns, [unknown.start for unknown in unknowns])
-    model = ImageModel.of(seen)
+    model = Model.of(predictor, unknowns)
     if progress is not None:
         progress(0.5, "lit intervals")
     # Paths cost more than what is done with them: starts have some of their own where these are far fewer.
-    few = len(model.image) > _FEWER * seen.pixels_of_rays(_FEW_RAYS)
-    start = best_start(ImageModel.of(seen, most=_FEW_RAYS) if few else model, unknowns)
-    derivatives = model.derivatives(unknowns, start) / model.relative()[:, :, None]
-    groups = confounded_groups(derivatives.reshape(-1, len(unknowns)))
-    held = {number for group in groups for number in group.held}
-    free = [number for number in range(len(unknowns)) if number not in held]
-    given = {number: unknowns[number].inward(unknowns[number].start) for number in held}
-    if not free:
-        return model, groups, no_solution(model), unknowns
-    inner = start[free]
-    turns = _MOVES if any(unknowns[number].moves for number in free) else 1
+    few = Predictor(replace(predictor.seen, rays=_FEW_RAYS), predictor.light)
+    start = best_start(Model.of(few, unknowns) if len(model.image) > _FEWER * few.seen.most_pixels else model)
+    groups = confounded_groups((model.slopes(start) / model.relative[:, :, None]).reshape(-1, len(unknowns)))
+    free = ~np.isin(np.arange(len(unknowns)), [number for group in groups for number in group.held])
+    model, inner = model.holding(free, model.at), start[free]
+    if not free.any():
+        return _Solved(model, free, groups, no_solution(model))
+    inner = robust_fit(model, inner)
+    turns = _MOVES if any(unknown.held for unknown in model.unknowns) else 1
     for turn in range(turns):
-        fixed = _holding(model, unknowns, given)
-        known = [unknowns[number] for number in free]
-        inner = robust_fit(fixed, known, inner) if turn == 0 else inner
-        solution = weighted_fit(fixed, known, inner)
+        solution = weighted_fit(model, inner)
         step, inner = np.abs(solution.inner - inner), solution.inner
         if progress is not None:
             progress(0.5 + 0.5 * (turn + 1) / _MOVES, "fit")
-        still = np.maximum(_STILL * _size(seen), _STILL_IN_NOISE * np.sqrt(np.maximum(np.diag(solution.covariance), 0)))
+        error = np.sqrt(np.maximum(np.diag(solution.covariance), 0))
+        still = np.maximum(_STILL * _size(predictor.reference), _STILL_IN_NOISE * error)
         if turn + 1 == turns or (turn and np.all(step < still)):
             break
-        outward = [unknown.start for unknown in unknowns]
-        for number, value in zip(free, inner, strict=True):
-            outward[number] = unknowns[number].outward(value)
-        seen, unknowns = _moved(seen, unknowns, outward)
-        model = ImageModel.of(seen)
-    return fixed, groups, solution, unknowns
+        model = replace(model, at=inner)
+    return _Solved(model, free, groups, solution)
 
 
-def _size(seen: Seen) -> float:
-    return max(
-        (float(np.linalg.norm(light.position - seen.reference.origin)) for light in seen.reference.lights), default=1.0
-    )
-
-
-def _moved(seen: Seen, unknowns: Sequence[Unknown], values: Sequence[float]) -> tuple[Seen, tuple[Unknown, ...]]:
-    """Return an image with the lights where parameters put them, and the parameters relative to there."""
-    places = {number: list(light.position) for number, light in enumerate(seen.reference.lights)}
-    moved = list(unknowns)
-    for row, (unknown, value) in enumerate(zip(unknowns, values, strict=True)):
-        if unknown.moves:
-            _, light, axis = unknown.paths[0]
-            places[int(light)][int(axis)] = value
-            moved[row] = replace(unknown, place=value)
-    return at_places(seen, {number: (x, y, z) for number, (x, y, z) in places.items()}), tuple(moved)
-
-
-def _holding(model: ImageModel, unknowns: Sequence[Unknown], given: Mapping[int, float]) -> ImageModel:
-    """Return the model with parameters held."""
-    fog = model.fog
-    for number, inner in given.items():
-        fog = unknowns[number].put(fog, unknowns[number].outward(inner))
-    return replace(model, fog=fog)
+def _size(reference: ReferenceScene) -> float:
+    return max((float(np.linalg.norm(light.position - reference.origin)) for light in reference.lights), default=1.0)
 
 
 def _left(solution: Solution) -> Array:
@@ -236,29 +207,19 @@ def _wrong(solution: Solution) -> float:
     return float(np.abs(relative_errors(solution.radiance, image, floor)).mean()) if image.size else math.inf
 
 
-def _fit(
-    what: tuple[str, str, str, str],
-    model: ImageModel,
-    groups: tuple[Group, ...],
-    solution: Solution,
-    unknowns: Sequence[Unknown],
-) -> Fit:
-    held = {number for group in groups for number in group.held}
+def _fit(what: tuple[str, str, str, str], unknowns: tuple[Unknown, ...], found: _Solved) -> Fit:
+    model, solution, groups = found.model, found.solution, found.groups
     doubtful = {number for group in groups for number in group.members}
-    free = [number for number in range(len(unknowns)) if number not in held]
-    known = [unknowns[number] for number in free]
-    reach = interval_ends(model, known, solution) - solution.inner[:, None]
-    lengths = dict(zip(free, np.copysign(np.hypot(reach, SIGMAS * _KNOWN), [-1, 1]), strict=True))
-    inner = {number: unknowns[number].inward(unknowns[number].start) for number in held}
-    inner |= dict(zip(free, (float(value) for value in solution.inner), strict=True))
+    inner = Model.of(model.predictor, unknowns).at
+    inner[found.free] = solution.inner
+    reach = interval_ends(model, solution) - solution.inner[:, None]
+    lengths = np.full((len(unknowns), 2), np.nan)
+    lengths[found.free] = np.copysign(np.hypot(reach, SIGMAS * _KNOWN), [-1, 1])
     rows = []
     for number, unknown in enumerate(unknowns):
-        outward = unknown.outward
-        ends: tuple[float | None, float | None] = (None, None)
-        if number not in doubtful:
-            low, high = inner[number] + lengths[number]
-            ends = _finite(outward(float(low))), _finite(outward(float(high)))
-        rows.append(Fitted(unknown.name, float(outward(inner[number])), *ends, unknown.unit, unknown.scene))
+        value, low, high = (unknown.number.outward(inner[number] + part) for part in (0.0, *lengths[number]))
+        ends = (None, None) if number in doubtful else (_finite(low), _finite(high))
+        rows.append(Fitted(unknown.name, value, *ends, unknown.unit, unknown.scene))
     kept = solution.kept
     image, residual = model.image[kept], solution.residual[kept]
     mean = float(np.abs(image).mean()) if image.size else math.nan

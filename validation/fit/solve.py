@@ -36,18 +36,19 @@ Jewell 1990, Biometrika 77, 485). Where the image is linear, these are the ends 
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import compress, product
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares, nnls
+from scipy.optimize import nnls
 
 from validation.arrays import Array, Bools
-from validation.engine.seen import Seen
-from validation.fit.unknowns import Unknown, with_values
-from validation.fog_model.radiance import Fog, FogModel, scene_fog
+from validation.engine.fault import Number
+from validation.engine.prediction import Guess, Predictor
+from validation.engine.search import guess_of, inward, least_squares_place, outward
+from validation.fit.unknowns import Unknown
 
 SIGMAS = 1.959964  #: standard errors in half of a 95 % interval
 
@@ -71,43 +72,55 @@ _UNBOUNDED = 30.0  # a factor of 10^13: where an image allows it, there is no en
 
 
 @dataclass(frozen=True)
-class ImageModel:
-    """The pixels of an image that take part, and their paths."""
+class Model:
+    """The values of an image's pixels, as a function of the places of parameters on the whole line."""
 
-    seen: Seen
-    model: FogModel
-    fog: Fog  #: as the scene has it
+    predictor: Predictor
+    unknowns: tuple[Unknown, ...]
+    at: Array  #: where paths are found, which are held for other places, (unknowns,)
+    guess: Guess  #: with the parameters that are held
 
     @staticmethod
-    def of(seen: Seen, *, most: int = 20_000) -> "ImageModel":
-        """Return the model of an image; so many rays are looked at: more say nothing new of few numbers."""
-        return ImageModel(seen, seen.model(seen.view(most=most)), scene_fog(seen.reference))
+    def of(predictor: Predictor, unknowns: tuple[Unknown, ...]) -> "Model":
+        """Return the model of an image with the paths where parameters begin."""
+        numbers = [unknown.number for unknown in unknowns]
+        return Model(predictor, unknowns, inward(numbers, [each.starts[0] for each in numbers]), Guess(predictor.fog))
+
+    @property
+    def numbers(self) -> list[Number]:
+        """The numbers that are looked for."""
+        return [unknown.number for unknown in self.unknowns]
 
     @property
     def image(self) -> Array:
         """The values of the image, (m, 3)."""
-        return self.seen.values[self.model.view.pixels]
+        return self.predictor.shown(self.guess)
 
-    def radiance(self, fog: Fog) -> Array:
+    def with_places(self, place: Array) -> Guess:
+        """Return the guess for places of the parameters."""
+        values, at = (outward(self.numbers, each) for each in (place, self.at))
+        return guess_of(self.predictor, self.unknowns, values, at=at, guess=self.guess)
+
+    def values(self, place: Array) -> Array:
         """Return the radiance of the pixels, (m, 3) [W/(m^2 sr)]."""
-        return self.seen.held(self.model.layers(fog))
+        return self.predictor.predicted(self.with_places(place))
 
-    def values(self, unknowns: Sequence[Unknown], inner: Sequence[float] | Array) -> Array:
-        """Return the radiance for values of parameters, given as numbers on the whole line, (m, 3)."""
-        return self.radiance(with_values(unknowns, self.fog, inner))
+    def slopes(self, place: Array) -> Array:
+        """Return the derivatives of `values` by each place, (m, 3, unknowns)."""
+        steps = _STEP * np.eye(len(place))
+        return np.stack([(self.values(place + step) - self.values(place - step)) / (2 * _STEP) for step in steps], 2)
 
-    def derivatives(self, unknowns: Sequence[Unknown], inner: Sequence[float] | Array) -> Array:
-        """Return the derivatives of `values` by each of these numbers, (m, 3, unknowns)."""
-        slopes = []
-        for number in range(len(unknowns)):
-            high, low = (np.array(inner, dtype=np.float64) for _ in range(2))
-            high[number] += _STEP
-            low[number] -= _STEP
-            slopes.append((self.values(unknowns, high) - self.values(unknowns, low)) / (2 * _STEP))
-        return np.stack(slopes, axis=2)
+    def holding(self, free: Bools, place: Array) -> "Model":
+        """Return the model with the parameters that are not free held where they are at a place."""
+        free_ones, held_ones = (
+            replace(self, unknowns=tuple(compress(self.unknowns, chosen)), at=self.at[chosen])
+            for chosen in (free, ~free)
+        )
+        return replace(free_ones, guess=held_ones.with_places(place[~free]))
 
+    @property
     def relative(self) -> Array:
-        """Return the unit of relative errors, (m, 3)."""
+        """The unit of relative errors, (m, 3)."""
         size = np.abs(self.image)
         return np.maximum(size, _DIM * max(float(size.mean()), 1e-300))
 
@@ -125,57 +138,45 @@ class Solution:
     stretch: Array  #: variances over those of independent values of these weights, (parameters,)
 
 
-def best_start(model: ImageModel, unknowns: Sequence[Unknown]) -> Array:
+def best_start(model: Model) -> Array:
     """Return where the search should begin: the best end of short searches from the best of many starts.
 
     Thin fog of a large albedo looks much like thick fog from afar, so that the best start may lead to a worse end.
     """
-    trials = sorted(_trials(model, unknowns), key=lambda trial: trial[0])[:_SEARCHES]
-    ends = [_search(model, unknowns, trial, _SHORT) for _, trial in trials]
-    return min(ends, key=lambda end: _loss(model, model.values(unknowns, end)))
+    trials = sorted(_trials(model), key=lambda trial: trial[0])[:_SEARCHES]
+    ends = [_search(model, trial, _SHORT) for _, trial in trials]
+    return min(ends, key=lambda end: _loss(model, model.values(end)))
 
 
-def robust_fit(model: ImageModel, unknowns: Sequence[Unknown], start: Array) -> Array:
+def robust_fit(model: Model, start: Array) -> Array:
     """Return the parameters with the least Cauchy loss of relative errors, its scale that of what is left."""
     for _ in range(2):
-        start = _search(model, unknowns, start, _LONG)
+        start = _search(model, start, _LONG)
     return start
 
 
-def _search(model: ImageModel, unknowns: Sequence[Unknown], start: Array, steps: int) -> Array:
+def _search(model: Model, start: Array, steps: int) -> Array:
     """Return the end of a search for the least Cauchy loss of relative errors."""
-    scale = model.relative()
+    scale = model.relative
 
     def residuals(inner: Array) -> Array:
-        return np.asarray(((model.image - model.values(unknowns, inner)) / scale).ravel())
+        return np.asarray(((model.image - model.values(inner)) / scale).ravel())
 
     def slopes(inner: Array) -> Array:
-        return np.asarray(-(model.derivatives(unknowns, inner) / scale[:, :, None]).reshape(-1, len(inner)))
+        return np.asarray(-(model.slopes(inner) / scale[:, :, None]).reshape(-1, len(inner)))
 
     unit = max(2 * 1.4826 * float(np.median(np.abs(residuals(start)))), 1e-7)
-    return _least(residuals, slopes, unknowns, start, loss="cauchy", f_scale=unit, max_nfev=steps)
+    how: dict[str, Any] = {"loss": "cauchy", "f_scale": unit, "max_nfev": steps}
+    return least_squares_place(residuals, slopes, model.numbers, start, **how)
 
 
-def _least(
-    residuals: Callable[[Array], Array],
-    slopes: Callable[[Array], Array],
-    unknowns: Sequence[Unknown],
-    start: Array,
-    **how: Any,
-) -> Array:
-    """Return the end of a search for the least sum of squares, not farther from its start than parameters allow."""
-    reach = np.array([unknown.farthest for unknown in unknowns])
-    ends = start - reach, start + reach
-    return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
-
-
-def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float, Array]]:
+def _trials(model: Model) -> list[tuple[float, Array]]:
     """Return starts with their losses: all extinctions times a factor, with some g, and the factor that fits best.
 
     The extinctions are those to begin with and, where these differ from one another, their mean: channels whose starts
     lie decades apart lead to no common end.
     """
-    given = np.array([unknown.inward(unknown.start) for unknown in unknowns])
+    given, unknowns = model.at, model.unknowns
     sigmas = [n for n, unknown in enumerate(unknowns) if unknown.kind.startswith("sigma")]
     gs = [n for n, unknown in enumerate(unknowns) if unknown.kind == "phase.g"]
     factors = [n for n, unknown in enumerate(unknowns) if unknown.kind in _FACTORS]
@@ -189,57 +190,55 @@ def _trials(model: ImageModel, unknowns: Sequence[Unknown]) -> list[tuple[float,
         trial = base.copy()
         trial[sigmas] += math.log(times)
         trial[gs] = given[gs] if g is None else math.atanh(g)
-        radiance = model.values(unknowns, trial)
+        radiance = model.values(trial)
         if factors:
             lit = (radiance > _DIM * radiance.mean()) & (model.image > 0)
             usual = float(np.median(model.image[lit] / radiance[lit])) if lit.any() else 1.0
             trial[chosen] += math.log(usual)
-            radiance = model.values(unknowns, trial)
+            radiance = model.values(trial)
         trials.append((_loss(model, radiance), trial))
     return trials
 
 
-def _loss(model: ImageModel, radiance: Array) -> float:
-    return float(np.mean(np.log1p(((model.image - radiance) / model.relative() / _USUAL) ** 2)))
+def _loss(model: Model, radiance: Array) -> float:
+    return float(np.mean(np.log1p(((model.image - radiance) / model.relative / _USUAL) ** 2)))
 
 
-def weighted_fit(model: ImageModel, unknowns: Sequence[Unknown], start: Array) -> Solution:
+def weighted_fit(model: Model, start: Array) -> Solution:
     """Return the solution of least squares with the weights that the noise asks for, and without outliers."""
     inner, kept = start, np.ones(len(model.image), dtype=bool)
     for _ in range(_ROUNDS):
-        radiance = model.values(unknowns, inner)
+        radiance = model.values(inner)
         residual = model.image - radiance
         sigma = noise_of(radiance.ravel(), residual.ravel()).reshape(radiance.shape)
         before, kept = kept, ~outliers(residual, sigma)
         weights = 1 / sigma
         if kept.mean() < _LEAST_KEPT:
             # Nothing explains most of the image: what is left is no noise. All pixels count, relative to themselves.
-            weights, kept = 1 / model.relative(), np.ones_like(kept)
+            weights, kept = 1 / model.relative, np.ones_like(kept)
             break
-        last, inner = inner, _least(*_weighted(model, unknowns, weights, kept), unknowns, inner, max_nfev=40)
+        last, inner = inner, least_squares_place(*_weighted(model, weights, kept), model.numbers, inner, max_nfev=40)
         moved = float(np.max(np.abs(inner - last), initial=0.0))
         if moved < 1e-9 and np.array_equal(before, kept):
             break
-    radiance = model.values(unknowns, inner)
+    radiance = model.values(inner)
     residual = model.image - radiance
-    covariance, stretch = _sandwich(model.derivatives(unknowns, inner), residual, weights, kept)
+    covariance, stretch = _sandwich(model.slopes(inner), residual, weights, kept)
     return Solution(inner, covariance, residual, radiance, kept, weights, stretch)
 
 
-def no_solution(model: ImageModel) -> Solution:
+def no_solution(model: Model) -> Solution:
     """Return the solution where no parameter is free."""
-    radiance, empty = model.radiance(model.fog), np.empty(0)
+    radiance, empty = model.values(np.empty(0)), np.empty(0)
     residual, kept = model.image - radiance, np.ones(len(model.image), dtype=bool)
     return Solution(empty, np.empty((0, 0)), residual, radiance, kept, np.ones_like(radiance), empty)
 
 
-def _weighted(
-    model: ImageModel, unknowns: Sequence[Unknown], weights: Array, kept: Bools
-) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+def _weighted(model: Model, weights: Array, kept: Bools) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
     """Return the function whose squares are summed, of the parameters, (values,), and its derivatives."""
     return (
-        lambda inner: ((model.image - model.values(unknowns, inner)) * weights)[kept].ravel(),
-        lambda inner: -(model.derivatives(unknowns, inner) * weights[:, :, None])[kept].reshape(-1, len(inner)),
+        lambda inner: ((model.image - model.values(inner)) * weights)[kept].ravel(),
+        lambda inner: -(model.slopes(inner) * weights[:, :, None])[kept].reshape(-1, len(inner)),
     )
 
 
@@ -281,7 +280,7 @@ def outliers(residual: Array, sigma: Array) -> Bools:
     return np.asarray(np.any(np.abs(residual) > _OUTLIER * sigma, axis=1))
 
 
-def interval_ends(model: ImageModel, unknowns: Sequence[Unknown], solution: Solution) -> Array:
+def interval_ends(model: Model, solution: Solution) -> Array:
     """Return the ends of the 95 % intervals as numbers on the whole line, infinite where the image sets none.
 
     Returns
@@ -291,13 +290,12 @@ def interval_ends(model: ImageModel, unknowns: Sequence[Unknown], solution: Solu
     """
     reach = SIGMAS * np.sqrt(np.maximum(np.diag(solution.covariance), 0.0))
     ends = [
-        [_end(model, unknowns, solution, number, sign * float(step)) for sign in (-1, 1)]
-        for number, step in enumerate(reach)
+        [_end(model, solution, number, sign * float(step)) for sign in (-1, 1)] for number, step in enumerate(reach)
     ]
     return np.array(ends).reshape(-1, 2)
 
 
-def _end(model: ImageModel, unknowns: Sequence[Unknown], solution: Solution, number: int, step: float) -> float:
+def _end(model: Model, solution: Solution, number: int, step: float) -> float:
     """Return one end; `step` leads to that of the ellipse."""
     best = float(solution.inner[number])
     if not _LINEAR < abs(step) < math.inf:
@@ -306,7 +304,7 @@ def _end(model: ImageModel, unknowns: Sequence[Unknown], solution: Solution, num
     below, above = (0.0, -SIGMAS), (math.nan, math.nan)  # distances, and standard errors beyond the end there
     distance = step
     for _ in range(_TURNS):
-        place, errors = _profile(model, unknowns, solution, number, solution.inner + distance * way)
+        place, errors = _profile(model, solution, number, solution.inner + distance * way)
         way, beyond = (place - solution.inner) / distance, errors - SIGMAS
         if abs(beyond) < _CLOSE * SIGMAS or abs(above[0] - below[0]) < _CLOSE * abs(above[0]):
             return best + distance
@@ -324,28 +322,16 @@ def _end(model: ImageModel, unknowns: Sequence[Unknown], solution: Solution, num
     return best + distance if math.isfinite(above[0]) else math.copysign(math.inf, step)
 
 
-def _profile(
-    model: ImageModel, unknowns: Sequence[Unknown], solution: Solution, number: int, place: Array
-) -> tuple[Array, float]:
+def _profile(model: Model, solution: Solution, number: int, place: Array) -> tuple[Array, float]:
     """Return the best place with one parameter held, and how many standard errors it is away from the best of all."""
     free = np.arange(len(place)) != number
-    residual, slopes = _weighted(model, unknowns, solution.weights, solution.kept)
-
-    def whole(others: Array) -> Array:
-        inner = place.copy()
-        inner[free] = others
-        return inner
-
-    best = place
+    best = place.copy()
     if free.any():
-        others = _least(
-            lambda others: residual(whole(others)),
-            lambda others: slopes(whole(others))[:, free],
-            [unknown for unknown, is_free in zip(unknowns, free, strict=True) if is_free],
-            place[free],
-            ftol=1e-5,  # of Q, some thousand: standard errors are told to 1 %
-            max_nfev=20,
-        )
-        best = whole(others)
+        others = model.holding(free, place)
+        # The sum of squares is some thousand: `ftol` tells standard errors to 1 %.
+        how: dict[str, Any] = {"ftol": 1e-5, "max_nfev": 20}
+        weighted = _weighted(others, solution.weights, solution.kept)
+        best[free] = least_squares_place(*weighted, others.numbers, place[free], **how)
+    residual, _ = _weighted(model, solution.weights, solution.kept)
     least = float(np.sum((solution.residual * solution.weights)[solution.kept] ** 2))
     return best, math.sqrt(max(float(np.sum(residual(best) ** 2)) - least, 0.0) / float(solution.stretch[number]))

@@ -14,12 +14,12 @@ from analytic.errors import InputError
 from reference.scene.read import read_reference
 from reference.storage.exr import Image
 from tests.helpers.scenes import scene_xml
+from validation.engine.prediction import Guess, Predictor, SceneLight
 from validation.engine.seen import Seen
 from validation.estimates.quadrature import reference_image
 from validation.fit.fit import fit_image
-from validation.fit.solve import ImageModel, best_start, interval_ends, robust_fit, weighted_fit
+from validation.fit.solve import Model, best_start, interval_ends, robust_fit, weighted_fit
 from validation.fit.unknowns import read_unknowns
-from validation.fog_model.radiance import scene_fog
 from validation.scenes.loading import load_scene
 
 SIZE = (48, 36)
@@ -41,6 +41,10 @@ def image_of(path):
     return Image(
         {"airlight": reference.airlight, "surface": reference.surface, "total": reference.airlight + reference.surface}
     )
+
+
+def predictor_of(reference, values):
+    return Predictor(Seen(reference, values, "airlight", np.ones(len(values), bool)), SceneLight(reference))
 
 
 def fitted(image, scene, names, **how):
@@ -91,8 +95,8 @@ def test_each_of_several_lights_has_a_factor(variant, tmp_path):
     scene = scene_file(tmp_path, lights=2)
     reference = read_reference(load_scene(scene).scene)
     pixels = SIZE[0] * SIZE[1]
-    model = ImageModel.of(Seen(reference, np.ones((pixels, 3)), "airlight", np.ones(pixels, bool)))
-    bright = model.radiance(replace(model.fog, intensity=(1.4, 0.3)))
+    predictor = predictor_of(reference, np.ones((pixels, 3)))
+    bright = predictor.predicted(Guess(replace(predictor.fog, intensity=(1.4, 0.3))))
     image = Image({"airlight": bright.reshape(SIZE[1], SIZE[0], 3)})
     fit = fitted(image, scene, ["intensity", "sigma_t"])
     values = {each.name: each.value for each in fit.parameters}
@@ -154,12 +158,12 @@ def test_pixels_that_disagree_are_left_out(variant, tmp_path):
 @pytest.mark.parametrize("noise", ["relative", "absolute", "skewed"])
 def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, noise):
     reference = read_reference(load_scene(scene_file(tmp_path), (32, 24)).scene)
-    fog, count, trials = scene_fog(reference), 32 * 24, 200
-    unknowns = read_unknowns(["sigma_t", "phase.g", "intensity"], reference, fog, {})
-    model = ImageModel.of(Seen(reference, np.zeros((count, 3)), "airlight", np.ones(count, bool)))
-    clean = model.radiance(fog)
+    count, trials = 32 * 24, 200
+    unknowns = read_unknowns(["sigma_t", "phase.g", "intensity"], reference, {})
+    predictor = predictor_of(reference, np.zeros((count, 3)))
+    clean = predictor.predicted(Guess(predictor.fog))
     generator = np.random.default_rng(5)
-    wanted = np.array([unknown.inward(unknown.scene) for unknown in unknowns])
+    wanted = Model.of(predictor, unknowns).at
     covered = np.zeros(len(unknowns))
     for _ in range(trials):
         noisy = {
@@ -167,9 +171,9 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
             "absolute": lambda: clean + 0.01 * clean.mean() * generator.standard_normal(clean.shape),
             "skewed": lambda: clean * generator.gamma(25.0, 0.04, (count, 1)),
         }[noise]()
-        seen = replace(model, seen=replace(model.seen, values=noisy))
-        solution = weighted_fit(seen, unknowns, robust_fit(seen, unknowns, best_start(seen, unknowns)))
-        low, high = interval_ends(seen, unknowns, solution).T
+        model = Model.of(Predictor(replace(predictor.seen, values=noisy), predictor.light), unknowns)
+        solution = weighted_fit(model, robust_fit(model, best_start(model)))
+        low, high = interval_ends(model, solution).T
         covered += (low < wanted) & (wanted < high)
     # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once in 16 000, of which
     # nine are looked at.
