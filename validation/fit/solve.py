@@ -157,17 +157,10 @@ def robust_fit(model: Model, start: Array) -> Array:
 
 def _search(model: Model, start: Array, steps: int) -> Array:
     """Return the end of a search for the least Cauchy loss of relative errors."""
-    scale = model.relative
-
-    def residuals(inner: Array) -> Array:
-        return np.asarray(((model.image - model.values(inner)) / scale).ravel())
-
-    def slopes(inner: Array) -> Array:
-        return np.asarray(-(model.slopes(inner) / scale[:, :, None]).reshape(-1, len(inner)))
-
-    unit = max(2 * 1.4826 * float(np.median(np.abs(residuals(start)))), 1e-7)
+    residual, slopes = _weighted(model, 1 / model.relative, np.ones(len(model.image), dtype=bool))
+    unit = max(2 * 1.4826 * float(np.median(np.abs(residual(start)))), 1e-7)
     how: dict[str, Any] = {"loss": "cauchy", "f_scale": unit, "max_nfev": steps}
-    return least_squares_place(residuals, slopes, model.numbers, start, **how)
+    return least_squares_place(residual, slopes, model.numbers, start, **how)
 
 
 def _trials(model: Model) -> list[tuple[float, Array]]:

@@ -22,6 +22,7 @@ optical depth is that of a column, which the fog knows.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from reference.quadrature.homogeneous import smooth_pieces
 from reference.quadrature.light_airlight import LitRays, sun_stretches
 from reference.quadrature.pieces import Pieces, by_medium, cut, whole
 from reference.quadrature.segments import camera_segments
-from reference.quadrature.stretches import lit_stretches, profile_of
+from reference.quadrature.stretches import Stretches, lit_stretches, profile_of
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceScene
 from reference.scene.varying import HeightMedium
@@ -95,21 +96,13 @@ def point_nodes(
     by default.
     """
     rays = reach.rays
-    ray, x0, x1 = lit_stretches(light, rays, reach.lit)
-    if ends is not None:
-        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
-    used = x1 > x0
-    ray, x0, x1 = ray[used], x0[used], x1[used]
-    if not reference.media:
-        x1 = np.where(np.isinf(x1), np.maximum(x0, rays.foot[ray]) + _long_enough(reference, light.position), x1)
-        if isinstance(reference.medium, HeightMedium):
-            pieces = _by_height(reference, (ray, x0, x1))
-            ray, x0, x1 = pieces.ray, pieces.x0, pieces.x1
-        medium = np.full(len(ray), AROUND)
+    stretches = _within(lit_stretches(light, rays, reach.lit), ends)
+    if reference.media:
+        pieces, _ = smooth_pieces(reference, rays, camera_segments(reference, reach.distance), stretches)
     else:
-        pieces, _ = smooth_pieces(reference, rays, camera_segments(reference, reach.distance), (ray, x0, x1))
-        # The reference counts media with bounds from 0 and calls what surrounds them -1.
-        ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
+        pieces = _unbounded(reference, stretches, light.position)
+    # The reference counts media with bounds from 0 and calls what surrounds them -1.
+    ray, x0, x1, medium = pieces.ray, pieces.x0, pieces.x1, pieces.medium + 1
     foot, s0, s1 = rays.foot[ray], x0 - rays.foot[ray], x1 - rays.foot[ray]
     beside = np.where(s0 > 0, s0, np.where(s1 < 0, -s1, 0.0))
     height = np.maximum(rays.height[ray], np.maximum(_NEAR_ZERO * beside, _AT_LIGHT))
@@ -141,11 +134,7 @@ def parallel_nodes(
 ) -> Places:
     """Return the nodes of a directional light on the lit parts of all rays, see `point_nodes`."""
     rays = reach.rays
-    ray, x0, x1 = sun_stretches(reference, reach)
-    if ends is not None:
-        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
-    used = x1 > x0
-    stretches = ray[used], x0[used], x1[used]
+    stretches = _within(sun_stretches(reference, reach), ends)
     if isinstance(reference.medium, HeightMedium):
         pieces, depth = _before_sun(reference, light, stretches)
     else:
@@ -228,16 +217,34 @@ def lengths(reference: ReferenceScene, origin: Array, direction: Array, reach: A
     return np.stack([np.maximum(around, 0.0), *inside], axis=1)
 
 
-def _by_height(reference: ReferenceScene, stretches: tuple[Index, Array, Array]) -> Pieces:
-    """Cut lit stretches where rays cross heights at which the density of height fog has kinks."""
-    medium = reference.medium
-    assert isinstance(medium, HeightMedium)
-    if not len(stretches[0]):
-        return whole(stretches)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = (np.array(fog_of(medium).kinks)[:, None] - reference.origin @ medium.up) / (reference.direction @ medium.up)
-    number, ray = np.nonzero(np.isfinite(x) & (x > 0))
-    return cut(whole(stretches), (ray, x[number, ray]))
+def _within(stretches: Stretches, ends: tuple[Array, Array] | None) -> Stretches:
+    """Return what lies of lit stretches between the ends of their rays."""
+    ray, x0, x1 = stretches
+    if ends is not None:
+        x0, x1 = np.maximum(x0, ends[0][ray]), np.minimum(x1, ends[1][ray])
+    used = x1 > x0
+    return ray[used], x0[used], x1[used]
+
+
+def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) -> Pieces:
+    """Return lit stretches in a medium without bounds, cut at the heights at which the density of height fog has kinks.
+
+    `place`: an unbounded ray is followed from its foot point from there until little light is left.
+    """
+    medium, (ray, x0, x1), direction = reference.medium, stretches, reference.direction
+    sigma_t, kinks = medium.sigma_t, (np.empty(0, np.int64), np.empty(0))
+    if isinstance(medium, HeightMedium):
+        fog, up = fog_of(medium), medium.up
+        heights: list[Any] = [place @ up, reference.origin @ up, *(layer.base for layer in fog.layers)]
+        sigma_t = np.array([fog.density(np.clip(heights, fog.floor, fog.cap)).max()])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = (np.array(fog.kinks)[:, None] - reference.origin @ up) / (direction @ up)
+        number, row = np.nonzero(np.isfinite(x) & (x > 0))
+        kinks = row, x[number, row]
+    far = _NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min()) if np.any(sigma_t > 0) else 0.0
+    foot = np.sum((place - reference.origin) * direction[ray], axis=1)
+    pieces = whole((ray, x0, np.where(np.isinf(x1), np.maximum(x0, foot) + far, x1)))
+    return cut(pieces, kinks) if len(ray) and len(kinks[0]) else pieces
 
 
 def _heights(reference: ReferenceScene, ray: Index, x: Array) -> Array:
@@ -254,16 +261,12 @@ def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
     return np.asarray(np.abs(high - low) / least)
 
 
-def _before_sun(
-    reference: ReferenceScene, light: DirectionalLight, stretches: tuple[Index, Array, Array]
-) -> tuple[Pieces, Array]:
+def _before_sun(reference: ReferenceScene, light: DirectionalLight, stretches: Stretches) -> tuple[Pieces, Array]:
     """Return pieces of lit stretches in height fog, and how long each is in optical depths and in height."""
     medium = reference.medium
     assert isinstance(medium, HeightMedium)
     fog, mu = fog_of(medium), float(-light.direction @ medium.up)
-    ray, x0, x1 = stretches
-    x1 = np.where(np.isinf(x1), x0 + _long_enough(reference, reference.origin), x1)
-    pieces = _by_height(reference, (ray, x0, x1))
+    pieces = _unbounded(reference, stretches, reference.origin)
     for _ in range(_HALVES):
         first = pieces.first
         middle = 0.5 * (pieces.x0 + pieces.x1)[first]
@@ -274,20 +277,6 @@ def _before_sun(
     steep = 1 + np.abs(reference.direction[pieces.ray] @ medium.up) / mu
     depth = steep * fog.optical_depth(low, high, pieces.x1 - pieces.x0)
     return pieces, np.minimum(np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP)
-
-
-def _long_enough(reference: ReferenceScene, place: Array) -> float:
-    """Return how far behind its foot point from a place an unbounded ray is followed [m]."""
-    if isinstance(reference.medium, HeightMedium):
-        fog = fog_of(reference.medium)
-        bases = [layer.base for layer in fog.layers]
-        heights = np.clip(
-            [place @ reference.medium.up, reference.origin @ reference.medium.up, *bases], fog.floor, fog.cap
-        )
-        sigma_t = np.array([fog.density(heights).max()])
-    else:
-        sigma_t = reference.medium.sigma_t
-    return float(_NOTHING_LEFT / (_THINNEST * sigma_t[sigma_t > 0].min())) if np.any(sigma_t > 0) else 0.0
 
 
 def _profile(light: ReferenceLight, direction: Array) -> Array:
