@@ -23,8 +23,8 @@ from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.directional_light import is_directional
 from reference.scene.read import ReferenceLight, ReferenceScene
 from validation.engine.curves import agx, blender_filmic, filmic, to_srgb
-from validation.engine.prediction import Scenery
 from validation.estimates.quadrature import reference_layer
+from validation.fog_model.view import Scenery
 
 Array = NDArray[np.float64]
 

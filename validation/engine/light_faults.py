@@ -19,7 +19,8 @@ from validation.engine.fault import (
     with_law,
     with_scenery,
 )
-from validation.engine.prediction import Guess, Predictor, Scenery
+from validation.engine.prediction import Guess, Predictor
+from validation.fog_model.view import Scenery
 
 
 def _window(change: Callable[[Array], Array]) -> Change:
@@ -51,7 +52,7 @@ def position_held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> 
         return at_position(predictor, guess, p)
     held = at_position(predictor, guess, at)
     x, y, z = (value - before for value, before in zip(p, held.scenery.moved[0], strict=True))
-    return replace(held, fog=held.fog.with_entry("moved", 0, (x, y, z)))
+    return replace(held, fog=held.fog.put(("moved", 0), (x, y, z)))
 
 
 PLACE = tuple(Number(-1e3, 1e3, (0.0,), step=0.003, stride=0.1) for _ in range(3))

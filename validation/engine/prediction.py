@@ -11,69 +11,21 @@ from scipy.ndimage import gaussian_filter
 
 from reference.monte_carlo.batches import LAYERS
 from reference.monte_carlo.volpath import volpath_batch
-from reference.scene.read import ReferenceLight, ReferenceScene
+from reference.scene.read import ReferenceScene
 from validation.arrays import Array, Bools, Index
 from validation.engine.seen import APART, Seen, relative_errors
 from validation.fog_model.radiance import Fog, FogModel, scene_fog
-from validation.fog_model.view import Ends, View
+from validation.fog_model.view import Ends, Scenery, View
 
 Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
 
 _FEW_RAYS = 800  # with which faults that move paths are told apart
 _MANY_TRIANGLES = 20_000  # of which exact paths cost much: few pixels are looked at, and faults are searched by others
 _STEPS = 64  # shadow rays that find the lit parts of a ray there
-_SPHERE_SAMPLES = 32  # of a sphere in the place of a point light
 _BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
 _SMOOTH = 40  # of the width of an image: the width of the filter for that light
 _FLOOR = 0.01  # of the mean of an image: below it values count relative to this
 _BLACK = 1e-7  # of the mean that the scene itself would have: below it an image is black
-
-
-@dataclass(frozen=True)
-class Scenery:
-    """The properties of a scene that decide the paths of light; each combination has its own paths."""
-
-    shadows: bool = True
-    offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
-    zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
-    moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)  #: of the first point and spot lights [m]
-    cone: float = 1.0  #: factor on the angles of spots
-    edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
-    radius: float = 0.0  #: of spheres in the place of point lights [m]
-    blend: float = 0.0  #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
-
-    @property
-    def where(self) -> dict[str, Any]:
-        """The properties that decide the rays."""
-        return {"offset": self.offset, "zoom": self.zoom}
-
-    def lights(self, reference: ReferenceScene) -> tuple[ReferenceLight, ...]:
-        """Return the point and spot lights of a scene as this scenery has them."""
-        lights = []
-        for number, light in enumerate(reference.lights):
-            if number < len(self.moved):
-                light = replace(light, position=light.position + np.array(self.moved[number]))
-            if light.axis is not None and self.cone != 1:
-                cutoff, beam = (min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam))
-                light = replace(light, cutoff=cutoff, beam=beam)
-            if light.axis is not None and self.edge:
-                light = replace(light, beam=light.cutoff if self.edge == "hard" else 0.0)
-            lights.append(light)
-        return tuple(lights)
-
-    def model(self, seen: Seen, view: View, layer: int, ends: Ends | None) -> FogModel:
-        """Return the paths of a layer of an image, 0: airlight, 1: surfaces, with nodes between ends of a fog."""
-        return seen.model(
-            view,
-            self.lights(seen.reference),
-            ends=None if ends is None else view.ends(ends),
-            shadows=self.shadows,
-            radius=self.radius,
-            blend=self.blend,
-            airlight=layer == 0,
-            surface=layer == 1,
-            samples=max(_SPHERE_SAMPLES if self.radius else 0, seen.samples),
-        )
 
 
 @dataclass(frozen=True)
@@ -118,13 +70,13 @@ class SceneLight:
     def view(self, seen: Seen, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
         key = "view", scenery.offset, scenery.zoom, _sight(seen)
-        return self._once(key, lambda: seen.view(**scenery.where), lambda v: 40 * v.distance.size)
+        return self._once(key, lambda: seen.view(scenery), lambda v: 40 * v.distance.size)
 
     def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
         """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces; `ends`: of a fog."""
         key = "model", scenery, layer, ends, _sight(seen)
         view = self.view(seen, scenery)
-        return self._once(key, lambda: scenery.model(seen, view, layer, ends), lambda model: 20 * model.places)
+        return self._once(key, lambda: seen.model(view, scenery, layer, ends), lambda model: 20 * model.places)
 
     def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
         """Return a layer of the pixels for a fog, (m, 3) [W/(m^2 sr)]."""

@@ -10,12 +10,11 @@ leaves and ends at what the search leaves.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from validation.arrays import Array, Bools
 from validation.engine.fault import Fault, Number, Values
@@ -33,7 +32,6 @@ _LOST = 0.5  # fraction of the loss that is left of what is not this fault, afte
 _LITTLE = 0.9  # fraction of the loss that a step leaves which gains little
 _SMALL = 0.02  # of the step of differences: a change that is none
 _NEAR = 3  # steps of differences: how far few paths are off at most
-_FARTHEST = 10.0  # a factor of 22 000, or an artanh g of 10
 _STEP = 1e-4  # of differences, of a logarithm or in units of the parameter, where no paths move
 
 
@@ -146,24 +144,6 @@ def inward(numbers: Sequence[Number], values: Sequence[float]) -> Array:
 def outward(numbers: Sequence[Number], place: Sequence[float] | Array) -> Values:
     """Return the values that places on the whole line stand for."""
     return tuple(number.outward(each) for number, each in zip(numbers, place, strict=True))
-
-
-def least_squares_place(
-    residuals: Callable[[Array], Array],
-    slopes: Callable[[Array], Array],
-    numbers: Sequence[Number],
-    start: Array,
-    **how: Any,
-) -> Array:
-    """Return the place with the least sum of squares, or of another loss of SciPy's, in the ranges of the numbers.
-
-    A logarithm, or an artanh, does not go farther than `_FARTHEST` from where it starts: an image that needs more tells
-    nothing, and an unbounded step may overflow.
-    """
-    reach = np.array([math.inf if number.scale == "plain" else _FARTHEST for number in numbers])
-    low, high = (inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high"))
-    ends = np.maximum(low, start - reach), np.minimum(high, start + reach)
-    return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
 
 
 def usual_size(errors: Array) -> float:

@@ -13,13 +13,13 @@ from scipy.ndimage import binary_dilation
 from analytic.errors import InputError
 from reference.quadrature.emission import emitted_light
 from reference.quadrature.surface import surface_hits
-from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
+from reference.scene.read import ReferenceScene, read_reference
 from reference.scene.varying import GridMedium
 from reference.storage.exr import TOTAL, Image
 from validation.arrays import Array, Bools, Index
 from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer
 from validation.fog_model.radiance import FogModel, scene_fog
-from validation.fog_model.view import SAMPLES, View, scattering_paths, view_of
+from validation.fog_model.view import SAMPLES, SCENERY, Ends, Scenery, View, scattering_paths, view_of
 from validation.metrics.errors import wrong_pixels
 from validation.scenes.loading import LoadedScene, load_scene
 
@@ -54,11 +54,8 @@ class Seen:
     apart: int = APART  #: pixels between those that are looked at in pairs, where not all are; 0: each by itself
     steps: int = 0  #: shadow rays that find the lit parts of a ray; 0: they are exact
 
-    def view(self, **where: Any) -> View:
-        """Return the rays of the pixels that take part: one at random of each of as many equal parts of the image.
-
-        `where`: `offset` and `zoom` of `validation.fog_model.view.view_of`.
-        """
+    def view(self, scenery: Scenery = SCENERY) -> View:
+        """Return the rays of the pixels that take part: one at random of each of as many equal parts of the image."""
         pixels, count = np.flatnonzero(self.used), self.most_pixels
         if len(pixels) > count:
             places = (np.arange(count) + np.random.default_rng(0).random(count)) * (len(pixels) / count)
@@ -67,17 +64,16 @@ class Seen:
                 pixels = self._with_partners(pixels[::2])
             pixels = np.union1d(pixels, self.cut_off[_evenly(len(self.cut_off), count / int(self.used.sum()))])
         side = _SIDE if self.area else 0
-        return view_of(self.reference, pixels, rays_per_side=side, steps=self.steps, **where)
+        return view_of(self.reference, pixels, scenery, rays_per_side=side, steps=self.steps)
 
     @cached_property
     def cut_off(self) -> Index:
         """The pixels with values that are cut off, (n,)."""
         return np.flatnonzero(stopped(np.where(self.used[:, None], self.values, np.nan)).any(axis=1))
 
-    def model(self, view: View, lights: tuple[ReferenceLight, ...] | None = None, **how: Any) -> FogModel:
-        """Return the paths of the light that the image holds; `how`: see `scattering_paths`."""
-        parts = {"airlight": self.holds != SURFACE, "surface": self.holds != AIRLIGHT, "samples": self.samples}
-        return FogModel(view, scattering_paths(view, lights, **(parts | how)))
+    def model(self, view: View, scenery: Scenery, layer: int, ends: Ends | None) -> FogModel:
+        """Return the paths of a layer of the image, 0: airlight, 1: surfaces, with nodes between ends of a fog."""
+        return FogModel(view, scattering_paths(view, scenery, layers=(layer,), ends=ends, samples=self.samples))
 
     @property
     def most_pixels(self) -> int:

@@ -36,18 +36,18 @@ Jewell 1990, Biometrika 77, 485). Where the image is linear, these are the ends 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress, product
 from typing import Any
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import least_squares, nnls
 
 from validation.arrays import Array, Bools
 from validation.engine.fault import Number
 from validation.engine.prediction import Guess, Predictor
-from validation.engine.search import guess_of, inward, least_squares_place, outward
+from validation.engine.search import guess_of, inward, outward
 from validation.fit.unknowns import Unknown
 
 SIGMAS = 1.959964  #: standard errors in half of a 95 % interval
@@ -68,6 +68,7 @@ _LINEAR = 1e-3  # of a number on the whole line: in so short a step the image is
 _CLOSE = 0.02  # of half an interval
 _TURNS = 10  # where so many do not reach an end, there is none
 _GROWTH = 3.0  # of a step, at most
+_FARTHEST = 10.0  # a factor of 22 000, or an artanh g of 10
 _UNBOUNDED = 30.0  # a factor of 10^13: where an image allows it, there is no end
 
 
@@ -160,7 +161,25 @@ def _search(model: Model, start: Array, steps: int) -> Array:
     residual, slopes = _weighted(model, 1 / model.relative, np.ones(len(model.image), dtype=bool))
     unit = max(2 * 1.4826 * float(np.median(np.abs(residual(start)))), 1e-7)
     how: dict[str, Any] = {"loss": "cauchy", "f_scale": unit, "max_nfev": steps}
-    return least_squares_place(residual, slopes, model.numbers, start, **how)
+    return _least(residual, slopes, model.numbers, start, **how)
+
+
+def _least(
+    residuals: Callable[[Array], Array],
+    slopes: Callable[[Array], Array],
+    numbers: Sequence[Number],
+    start: Array,
+    **how: Any,
+) -> Array:
+    """Return the place with the least sum of squares, or of another loss of SciPy's, in the ranges of the numbers.
+
+    A logarithm, or an artanh, does not go farther than `_FARTHEST` from where it starts: an image that needs more tells
+    nothing, and an unbounded step may overflow.
+    """
+    reach = np.array([math.inf if number.scale == "plain" else _FARTHEST for number in numbers])
+    low, high = (inward(numbers, [getattr(number, end) for number in numbers]) for end in ("low", "high"))
+    ends = np.maximum(low, start - reach), np.minimum(high, start + reach)
+    return np.asarray(least_squares(residuals, start, slopes, bounds=ends, x_scale="jac", **how).x)
 
 
 def _trials(model: Model) -> list[tuple[float, Array]]:
@@ -210,7 +229,7 @@ def weighted_fit(model: Model, start: Array) -> Solution:
             # Nothing explains most of the image: what is left is no noise. All pixels count, relative to themselves.
             weights, kept = 1 / model.relative, np.ones_like(kept)
             break
-        last, inner = inner, least_squares_place(*_weighted(model, weights, kept), model.numbers, inner, max_nfev=40)
+        last, inner = inner, _least(*_weighted(model, weights, kept), model.numbers, inner, max_nfev=40)
         moved = float(np.max(np.abs(inner - last), initial=0.0))
         if moved < 1e-9 and np.array_equal(before, kept):
             break
@@ -324,7 +343,7 @@ def _profile(model: Model, solution: Solution, number: int, place: Array) -> tup
         # The sum of squares is some thousand: `ftol` tells standard errors to 1 %.
         how: dict[str, Any] = {"ftol": 1e-5, "max_nfev": 20}
         weighted = _weighted(others, solution.weights, solution.kept)
-        best[free] = least_squares_place(*weighted, others.numbers, place[free], **how)
+        best[free] = _least(*weighted, others.numbers, place[free], **how)
     residual, _ = _weighted(model, solution.weights, solution.kept)
     least = float(np.sum((solution.residual * solution.weights)[solution.kept] ** 2))
     return best, math.sqrt(max(float(np.sum(residual(best) ** 2)) - least, 0.0) / float(solution.stretch[number]))

@@ -23,14 +23,15 @@ step is a relative change.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+
+import numpy as np
 
 from analytic.errors import InputError, nearest
 from analytic.height_fog import HeightFog
 from reference.scene.read import ReferenceScene
 from validation.engine.fault import Fault, Number, Values
 from validation.engine.prediction import Guess, Predictor
-from validation.fog_model.radiance import Fog, scene_fog
+from validation.fog_model.radiance import Fog, Path, colour, scene_fog
 from validation.fog_model.view import light_sources
 
 CHANNELS = ("r", "g", "b")
@@ -50,8 +51,6 @@ _KINDS = {  # how a parameter is looked for, and its unit
 }
 NAMES = tuple(_KINDS)[: -len(LAYERS)]  #: of the parameters of homogeneous media
 _OF_MEDIA = ("sigma_t", "albedo", "phase.g")
-
-Path = tuple[str | int, ...]  # of a number in a fog: fields, and numbers in tuples
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def _unknown(name: str, kind: str, paths: tuple[Path, ...], scene: float) -> Unk
     def change(predictor: Predictor, guess: Guess, p: Values) -> Guess:
         fog = guess.fog
         for path in paths:
-            fog = _put(fog, path, p[0])
+            fog = fog.put(path, p[0])
         return replace(guess, fog=fog)
 
     return Unknown(name, f"{name} is {{0:.6g}}", change, (number,), kind=kind, paths=paths, scene=scene)
@@ -87,28 +86,20 @@ def _unknown(name: str, kind: str, paths: tuple[Path, ...], scene: float) -> Unk
 def _coordinate(name: str, kind: str, light: int, reference: ReferenceScene) -> Unknown:
     """Return a coordinate of the position of a light: shadows move with it, except where paths are held."""
     axis, places = AXES.index(kind[-1]), [each.position for each in reference.lights]
-    scene = float(places[light][axis])
+    scene, path = float(places[light][axis]), ("moved", light, axis)
 
     def change(predictor: Predictor, guess: Guess, p: Values) -> Guess:
-        moved = (*guess.scenery.moved, *[(0.0, 0.0, 0.0)] * len(places))[: len(places)]
-        return replace(guess, scenery=replace(guess.scenery, moved=_put(moved, (light, axis), p[0] - scene)))
+        moved = np.zeros((len(places), 3))
+        moved[: len(guess.scenery.moved)] = guess.scenery.moved
+        moved[light, axis] = p[0] - scene
+        return replace(guess, scenery=replace(guess.scenery, moved=tuple(colour(each) for each in moved)))
 
     def held(predictor: Predictor, guess: Guess, p: Values, at: Values) -> Guess:
         guess = change(predictor, guess, at)
-        return replace(guess, fog=_put(guess.fog, ("moved", light, axis), p[0] - at[0]))
+        return replace(guess, fog=guess.fog.put(path, p[0] - at[0]))
 
     number = Number(*_RANGES["plain"], starts=(scene,))
-    path = ("moved", light, axis)
     return Unknown(name, f"{name} is {{0:.6g}}", change, (number,), held=held, kind=kind, paths=(path,), scene=scene)
-
-
-def _put(whole: Any, path: Path, value: float) -> Any:
-    if not path:
-        return value
-    first, rest = path[0], path[1:]
-    if isinstance(first, str):
-        return replace(whole, **{first: _put(getattr(whole, first), rest, value)})
-    return (*whole[:first], _put(whole[first], rest, value), *whole[first + 1 :])
 
 
 def read_unknowns(names: Sequence[str], reference: ReferenceScene, starts: Mapping[str, float]) -> tuple[Unknown, ...]:

@@ -232,8 +232,10 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
     `place`: an unbounded ray is followed from its foot point from there until little light is left.
     """
     medium, (ray, x0, x1), direction = reference.medium, stretches, reference.direction
-    sigma_t, kinks = medium.sigma_t, (np.empty(0, np.int64), np.empty(0))
-    if isinstance(medium, HeightMedium):
+    kinks = np.empty(0, np.int64), np.empty(0)
+    if not isinstance(medium, HeightMedium):
+        sigma_t = medium.sigma_t
+    else:
         fog, up = fog_of(medium), medium.up
         heights: list[Any] = [place @ up, reference.origin @ up, *(layer.base for layer in fog.layers)]
         sigma_t = np.array([fog.density(np.clip(heights, fog.floor, fog.cap)).max()])

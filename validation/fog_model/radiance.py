@@ -31,9 +31,19 @@ from validation.fog_model.places import AROUND, Places
 from validation.fog_model.view import Ends, LightPaths, View
 
 Colour = tuple[float, float, float]
+Path = tuple[str | int, ...]  #: of a number in a fog: fields, and places in tuples
 PhaseLaw = Callable[[Array], Array]  #: of the cosine of the scattering angle, of mean 1 over the sphere
 
 _LARGEST = 1e100  # whose square is a number too
+
+
+def _put(whole: Any, path: Path, value: Any) -> Any:
+    if not path:
+        return value
+    first, rest = path[0], path[1:]
+    if isinstance(first, str):
+        return replace(whole, **{first: _put(getattr(whole, first), rest, value)})
+    return (*whole[:first], _put(whole[first], rest, value), *whole[first + 1 :])
 
 
 @dataclass(frozen=True)
@@ -63,11 +73,10 @@ class Fog:
     height: HeightFog | None = None  #: how the density of the medium without bounds depends on height
     up: Colour = (0.0, 0.0, 1.0)  #: unit vector along which heights are
 
-    def with_entry(self, name: str, number: int, value: Any) -> "Fog":
-        """Return the fog with another entry of one of its tuples, such as the `sigma_t` of a medium."""
-        old = getattr(self, name)
-        entry: dict[str, Any] = {name: (*old[:number], value, *old[number + 1 :])}
-        return replace(self, **entry)
+    def put(self, path: Path, value: Any) -> "Fog":
+        """Return the fog with another number, given by fields and by places in tuples, such as ('moved', 0, 2)."""
+        fog: Fog = _put(self, path, value)
+        return fog
 
     @property
     def ends(self) -> Ends | None:
@@ -150,9 +159,7 @@ class FogModel:
     def transmittance(self, fog: Fog) -> Array:
         """Return the fraction of light that the rays leave of what is at their ends, (m, 3) [1]."""
         view = self.view
-        slant = 1.0 if fog.spherical else 1 / (view.reference.direction @ view.axis)
-        length = view.length.copy()
-        length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * slant) - fog.near * slant, 0.0)
+        length = _between_ends(view.length, fog, 1 / (view.reference.direction @ view.axis))
         if fog.height is not None:
             origin, rise = view.reference.origin @ fog.up, view.reference.direction @ fog.up
             end = origin + np.where(rise == 0, 0.0, rise * length[:, AROUND])
@@ -179,7 +186,9 @@ class FogModel:
             strength = strength * places.r**2
         else:
             strength = strength * places.value[:, 0] / (4 * np.pi * (slant if "steps" in fog.planar else 1.0))
-        camera, log_density = self._camera_lengths(places, fog, slant), np.zeros(len(places.r))
+        flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
+        camera = _between_ends(places.camera / slant[:, None] if flat else places.camera, fog, slant)
+        log_density = np.zeros(len(places.r))
         if fog.height is not None:
             camera, light, log_density = self._by_height(places, fog, number, camera, light, away)
         total, sigma_t, count = np.zeros((len(view.pixels), 3)), np.array(fog.sigma_t), len(view.pixels)
@@ -197,16 +206,6 @@ class FogModel:
                 for channel in channels:
                     total[:, channel] += fog.albedo[medium][channel] * sigma_t[medium, channel] * summed
         return total
-
-    def _camera_lengths(self, places: Places, fog: Fog, slant: Array) -> Array:
-        flat = ("surfaces" if places.is_surface else "nodes") in fog.planar
-        camera = places.camera / slant[:, None] if flat else places.camera
-        if fog.near > 0 or np.isfinite(fog.far):
-            plane: Any = 1.0 if fog.spherical else slant
-            camera = camera.copy()
-            around = np.minimum(camera[:, AROUND], fog.far * plane) - fog.near * plane
-            camera[:, AROUND] = np.maximum(around, 0.0)
-        return camera
 
     def _by_height(
         self, places: Places, fog: Fog, number: int, camera: Array, light: Array, away: Array
@@ -239,6 +238,16 @@ class FogModel:
             own = (reference.medium, *reference.media)[medium].phase
             self._phases[key] = np.ones(len(cosine)) if own.is_constant else own(np.clip(places.cosine, -1, 1))
         return self._phases[key]
+
+
+def _between_ends(length: Array, fog: Fog, slant: Array) -> Array:
+    """Return a copy of lengths from the camera in each medium, (n, media), where one begins and ends as the fog says.
+
+    `slant`: lengths of rays over their depth along the camera's axis, (n,).
+    """
+    ends, length = (1.0 if fog.spherical else slant), length.copy()
+    length[:, AROUND] = np.maximum(np.minimum(length[:, AROUND], fog.far * ends) - fog.near * ends, 0.0)
+    return length
 
 
 def _falls(r: Array, fog: Fog) -> Array:

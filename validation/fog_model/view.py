@@ -36,7 +36,39 @@ Light = ReferenceLight | DirectionalLight
 Ends = tuple[float, float, str]
 
 SAMPLES = 16  #: of an area light
+_SPHERE_SAMPLES = 32  # of a sphere in the place of a point light
 _BEFORE = 1 - 1e-4  # fraction of the way to a light that a shadow ray goes
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """The properties of a scene that decide the paths of light, besides its own; each combination has its own paths."""
+
+    shadows: bool = True
+    offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
+    zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
+    moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)  #: of the first point and spot lights [m]
+    cone: float = 1.0  #: factor on the angles of spots
+    edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
+    radius: float = 0.0  #: of spheres in the place of point lights [m]
+    blend: float = 0.0  #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
+
+    def lights(self, reference: ReferenceScene) -> tuple[ReferenceLight, ...]:
+        """Return the point and spot lights of a scene as this scenery has them."""
+        lights = []
+        for number, light in enumerate(reference.lights):
+            if number < len(self.moved):
+                light = replace(light, position=light.position + np.array(self.moved[number]))
+            if light.axis is not None and self.cone != 1:
+                cutoff, beam = (min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam))
+                light = replace(light, cutoff=cutoff, beam=beam)
+            if light.axis is not None and self.edge:
+                light = replace(light, beam=light.cutoff if self.edge == "hard" else 0.0)
+            lights.append(light)
+        return tuple(lights)
+
+
+SCENERY = Scenery()  #: as the scene has it
 
 
 @dataclass(frozen=True)
@@ -151,23 +183,21 @@ def _place_of(light: Light) -> tuple[Any, ...]:
 def view_of(
     reference: ReferenceScene,
     pixels: Index | None = None,
+    scenery: Scenery = SCENERY,
     *,
     rays_per_side: int = 0,
-    offset: tuple[float, float] = (0.0, 0.0),
-    zoom: float = 1.0,
     steps: int = 0,
 ) -> View:
     """Return the rays of some pixels.
 
     `pixels`: numbers of the pixels, row by row; all by default; `rays_per_side`: 0: one ray through the centre of each
-    pixel. n: n x n rays, one through the middle of each cell of a grid, whose mean is that over the pixel; `offset`:
-    moves all rays on the film, to the right and down [pixels]; `zoom`: factor on the distance of all rays from the
-    middle of the film, before they are moved; `steps`: see `View`.
+    pixel. n: n x n rays, one through the middle of each cell of a grid, whose mean is that over the pixel; `steps`: see
+    `View`.
     """
     size = reference.width, reference.height
     pixels = np.arange(size[0] * size[1]) if pixels is None else np.unique(pixels)
     positions, middle = _positions(pixel_centres(size)[pixels], rays_per_side), 0.5 * np.array(size)
-    positions = middle + zoom * (positions - middle) + np.asarray(offset)
+    positions = middle + scenery.zoom * (positions - middle) + np.asarray(scenery.offset)
     rays = replace(reference, direction=film_directions(reference.scene.sensors()[0], positions, size))
     shapes, hits = read_shapes(reference.occluders), surface_hits(rays)
     distance = exact_distance(rays, hits.interaction, hits.distance, shapes)
@@ -199,44 +229,35 @@ class LightPaths:
 
 def scattering_paths(
     view: View,
-    lights: Sequence[ReferenceLight] | None = None,
+    scenery: Scenery = SCENERY,
     *,
-    radius: float = 0.0,
-    blend: float = 0.0,
-    ends: tuple[Array, Array] | None = None,
-    shadows: bool = True,
-    airlight: bool = True,
-    surface: bool = True,
+    layers: Sequence[int] = (0, 1),
+    ends: Ends | None = None,
     samples: int = SAMPLES,
 ) -> tuple[LightPaths, ...]:
     """Return all paths of a view, by light.
 
-    `lights`: point and spot lights in the place of those of the scene; `radius`: of spheres that take the place of
-    point lights, of the same intensity [m]; `blend`: fraction of 1 - cos(cut-off), from the cut-off inwards, in which
-    spots fall off smoothly, besides their own edge; `ends`: distances between which rays have nodes, (rays,) each [m];
-    `shadows`: false where surfaces hide nothing from the lights; `samples`: how many stand for an area light.
+    `layers`: 0: airlight, 1: surfaces; `ends`: of a fog, between which rays have nodes; `samples`: how many stand for
+    an area light.
     """
-    reference = view.reference if lights is None else replace(view.reference, lights=tuple(lights))
+    reference = replace(view.reference, lights=scenery.lights(view.reference))
+    between, shadows = None if ends is None else view.ends(ends), scenery.shadows
+    # A directional light comes through a medium without bounds only where its density falls with height.
+    far = bool(reference.media) or isinstance(reference.medium, HeightMedium)
     paths = []
-    for source in light_sources(reference, samples, radius):
-        nodes, lit = (
-            [no_places(len(reference.media) + 1, surface=False)],
-            [no_places(len(reference.media) + 1, surface=True)],
-        )
+    for source in light_sources(reference, samples, scenery.radius):
+        nodes, points = ([no_places(len(reference.media) + 1, surface=surface)] for surface in (False, True))
         for given in source.lights:
-            light = _whole_within(given, blend) if blend else given
-            nowhere = not reference.media and not isinstance(
-                reference.medium, HeightMedium
-            )  # directional light scatters
-            if airlight and not (isinstance(light, DirectionalLight) and nowhere):
+            light = _whole_within(given, scenery.blend) if scenery.blend else given
+            is_far = isinstance(light, DirectionalLight)
+            if 0 in layers and (far or not is_far):
                 reach = view.reach(light, shadows=shadows, area=source.area)
-                make: Any = parallel_nodes if isinstance(light, DirectionalLight) else point_nodes
-                nodes.append(_edged(make(reference, light, reach, ends), light, source, blend))
-            if surface and reference.occluders.shapes():
-                reflected, visible = view.reflected(light, shadows=shadows)
-                points = surface_points(reference, light, view.distance, reflected, visible)
-                lit.append(_edged(points, light, source, blend))
-        paths.append(LightPaths(np.asarray(source.intensity), Places.joined(nodes), Places.joined(lit)))
+                make: Any = parallel_nodes if is_far else point_nodes
+                nodes.append(_edged(make(reference, light, reach, between), light, source, scenery.blend))
+            if 1 in layers and reference.occluders.shapes():
+                lit = surface_points(reference, light, view.distance, *view.reflected(light, shadows=shadows))
+                points.append(_edged(lit, light, source, scenery.blend))
+        paths.append(LightPaths(np.asarray(source.intensity), Places.joined(nodes), Places.joined(points)))
     return tuple(paths)
 
 
@@ -254,14 +275,14 @@ class Source:
 def light_sources(reference: ReferenceScene, samples: int = SAMPLES, radius: float = 0.0) -> list[Source]:
     """Return the lights of a scene: point and spot lights, directional ones, then area lights.
 
-    The parameters are those of `scattering_paths`.
+    `samples`: how many stand for an area light; `radius`: of spheres that take the place of point lights [m].
     """
     emitters = reference.scene.emitters()
     far_names = [emitter.id() for emitter in emitters if is_directional(emitter)]
     near_names = [emitter.id() for emitter in emitters if not is_directional(emitter) and not is_area(emitter)]
     plan = PointPlan(most=samples)
     near = [
-        _as_sphere(name, light, plan, radius)
+        _as_sphere(name, light, PointPlan(most=max(samples, _SPHERE_SAMPLES)), radius)
         if radius > 0 and light.axis is None
         else Source(name, light.intensity, (light,))
         for name, light in zip(near_names, reference.lights, strict=True)

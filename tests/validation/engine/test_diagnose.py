@@ -25,7 +25,7 @@ from validation.engine.prediction import Guess, SceneLight
 from validation.engine.search import Explanation, _Search
 from validation.engine.seen import seen_image
 from validation.fog_model.radiance import FogModel, scene_fog
-from validation.fog_model.view import scattering_paths, view_of
+from validation.fog_model.view import Scenery, scattering_paths, view_of
 from validation.scenes.loading import load_scene
 
 SIZE = (32, 24)
@@ -89,7 +89,7 @@ def test_a_light_with_a_radius_is_named(variant, tmp_path):
     path.write_text(scene_xml(fog=FOG + '<phase type="hg"><float name="g" value="0.47"/></phase>'))
     own = read_reference(load_scene(str(path), SIZE).scene)
     view = view_of(own)
-    model = FogModel(view, scattering_paths(view, radius=0.25, samples=64))
+    model = FogModel(view, scattering_paths(view, Scenery(radius=0.25), samples=64))
     image = model.layers(scene_fog(own)).sum(axis=0).reshape(SIZE[1], SIZE[0], 3)
     assert diagnosed(image, str(path)).first == "light-radius"
 
