@@ -283,8 +283,7 @@ def _fit(
 
     activate()
     from reports.api.comparisons import fitted
-    from validation.engine.judged_layer import judged_layer
-    from validation.engine.seen import scene_of_size
+    from validation.engine.seen import judged_layer, scene_of_size
     from validation.fit.fit import fit_image
 
     size = judged_layer(layers, name, name=layer, holds=how["holds"]).size

@@ -3,8 +3,7 @@
 
 Read in this order:
 
-- `judged_layer.py`: which layer of an image is judged, and what light it holds;
-- `seen.py`: its values, the pixels that take part, and their paths of light;
+- `seen.py`: which layer of an image is judged, its values, and the pixels that take part;
 - `prediction.py`: what a fog, lights, a camera and an encoding make of a scene;
 - `curves.py`: encodings and tone curves;
 - `fault.py`: what a fault is, and how it changes a guess;

@@ -29,10 +29,17 @@ from validation.engine.evidence import (
 )
 from validation.engine.fault import Fault
 from validation.engine.faults import KINDS, faults_of
-from validation.engine.judged_layer import JudgedLayer, judged_layer
 from validation.engine.prediction import Predictor, SceneLight
 from validation.engine.search import Explanation, begin, explain
-from validation.engine.seen import decide_pixel, layers_of, pixel_kinds, scene_of_size, seen_image
+from validation.engine.seen import (
+    PIXEL_WORDS,
+    decide_pixel,
+    judged_layer,
+    layers_of,
+    pixel_kinds,
+    scene_of_size,
+    seen_image,
+)
 from validation.scenes.loading import LoadedScene
 
 RIGHT, UNEXPLAINED = "right", "unexplained"
@@ -85,9 +92,8 @@ class Diagnosis:
     @property
     def lines(self) -> list[str]:
         """The first explanation, the error that it leaves, and the others that were tried."""
-        pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
         off = f"values are {_percent(self.residual)} off in the mean"
-        lines = [f"{self.path}, {self.layer}, against {self.scene}, {pixel}: {off}."]
+        lines = [f"{self.path}, {self.layer}, against {self.scene}, {PIXEL_WORDS[self.pixel]}: {off}."]
         together = [row for row in self.ranked if row.together]
         if self.first == RIGHT:
             lines.append(f"Nothing is wrong with it: the difference is {self.rest}.")
@@ -118,12 +124,14 @@ def diagnose_file(
     """Diagnose an EXR file of a scene: each of airlight and surfaces where it has both; see `diagnose_image`.
 
     `path`, `scene`: the EXR file; a built-in scene or a Mitsuba XML file; `layer`, `holds`: which layer, see
-    `validation.engine.judged_layer.judged_layer`.
+    `validation.engine.seen.judged_layer`.
     """
     image = read_exr(path)
     several = layers_of(image, str(path), layer, holds)
     loaded = scene_of_size(scene, several[0].size, path)
-    return tuple(diagnose_image(image, loaded, path=str(path), judged=judged, **how) for judged in several)
+    return tuple(
+        diagnose_image(image, loaded, path=str(path), layer=each.name, holds=each.holds, **how) for each in several
+    )
 
 
 def diagnose_image(
@@ -133,7 +141,6 @@ def diagnose_image(
     path: str = "the image",
     layer: str | None = None,
     holds: str | None = None,
-    judged: JudgedLayer | None = None,
     pixel: str | None = None,
     light: SceneLight | None = None,
     progress: Progress | None = None,
@@ -141,11 +148,10 @@ def diagnose_image(
     """Say what is wrong with an image of a scene.
 
     `image`, `loaded`: the layers, and the scene at their size; `layer`, `holds`: which layer, and what it holds:
-    'airlight', 'surface' or 'total'; `judged`: the layer itself, if it is known; `pixel`: 'centre' or 'area'; by
-    default what the image says of itself, or what fits better; `light`: of this scene, as other images of it have found
-    it.
+    'airlight', 'surface' or 'total'; `pixel`: 'centre' or 'area'; by default what the image says of itself, or what
+    fits better; `light`: of this scene, as other images of it have found it.
     """
-    judged = judged or judged_layer(image, path, name=layer, holds=holds)
+    judged = judged_layer(image, path, name=layer, holds=holds)
     seen, wrong = seen_image(image, judged, loaded.scene)
     if (count := int(seen.used.sum())) < _FEWEST:
         raise InputError(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from analytic.errors import InputError, nearest
 from reference.storage.exr import read_exr
 from validation.engine.judge import EngineComparison, ReferenceOf, judge_image
-from validation.engine.judged_layer import AIRLIGHT, SURFACE, judged_layer
+from validation.engine.seen import AIRLIGHT, SURFACE, judged_layer
 from validation.metrics.errors import Metrics, error_metrics
 from validation.scenes.loading import LoadedScene
 from validation.timing import Timing

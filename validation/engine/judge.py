@@ -40,10 +40,14 @@ from validation.arrays import Array, Bools, Progress
 from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
 from validation.engine.error_place import ErrorPlace, error_place
 from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
-from validation.engine.judged_layer import KINDS, JudgedLayer, expected_layer, judged_layer
 from validation.engine.seen import (
+    KINDS,
+    PIXEL_WORDS,
+    JudgedLayer,
     PixelKind,
     decide_pixel,
+    expected_layer,
+    judged_layer,
     pixel_kinds,
     relative_errors,
     scene_of_size,
@@ -111,10 +115,9 @@ class EngineComparison:
     def summary(self) -> str:
         """Return the numbers as text, a line for each group."""
         of = "airlight + surface" if self.expected == TOTAL else self.expected
-        pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
         lines = [
-            f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; reference: {of}, {pixel}, airlight "
-            f"known to {self.reference_error:.2g} of its mean",
+            f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; reference: {of}, "
+            f"{PIXEL_WORDS[self.pixel]}, airlight known to {self.reference_error:.2g} of its mean",
             f"pixels           {self.kind.words}",
             self.comparison.summary(),
         ]
@@ -142,7 +145,7 @@ def compare_scene(
     """Compare an EXR file with the reference of a scene at the file's size.
 
     `scene`: a built-in scene or a Mitsuba XML file; `layer`, `holds`: the layer to judge and what it holds, see
-    `validation.engine.judged_layer.judged_layer`; `pixel`: 'centre' or 'area', see
+    `validation.engine.seen.judged_layer`; `pixel`: 'centre' or 'area', see
     `reference.quadrature.image.quadrature_image`; by default what the image says of itself, or what fits; `mask`: an
     EXR file that is 0 in pixels to leave out; `all_metrics`: see `validation.comparison.images.compare_images`;
     `margin`: largest relative bias [1] that counts as agreement; with standard errors, what they can show counts.

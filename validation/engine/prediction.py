@@ -24,6 +24,7 @@ _MANY_TRIANGLES = 20_000  # of which exact paths cost much: few pixels are looke
 _STEPS = 64  # shadow rays that find the lit parts of a ray there
 _BATCHES, _PATHS = 4, 16  # batches of paths a pixel for the light of multiple scattering
 _SMOOTH = 40  # of the width of an image: the width of the filter for that light
+_MOST_RADIANCE = 6_000_000  # numbers of radiance that are kept
 _FLOOR = 0.01  # of the mean of an image: below it values count relative to this
 _BLACK = 1e-7  # of the mean that the scene itself would have: below it an image is black
 
@@ -46,8 +47,9 @@ class SceneLight:
     """The light of a scene, which all images of it share: paths by scenery, radiance by fog."""
 
     reference: ReferenceScene
-    most: int = 12_000_000  #: numbers that are kept, those used last: some eight bytes each
-    _kept: dict[Any, tuple[Any, int]] = field(default_factory=dict)  # with their sizes; the one used last comes last
+    most: float = 12_000_000  #: numbers of paths that are kept, those used last: some eight bytes each
+    # By kind, with their sizes; the one used last comes last.
+    _kept: dict[str, dict[Any, tuple[Any, int]]] = field(default_factory=lambda: {"paths": {}, "radiance": {}})
 
     @cached_property
     def higher_orders(self) -> Array | None:
@@ -70,32 +72,33 @@ class SceneLight:
     def view(self, seen: Seen, scenery: Scenery) -> View:
         """Return the rays of an image in a scenery, and what is known of them."""
         key = "view", scenery.offset, scenery.zoom, _sight(seen)
-        return self._once(key, lambda: seen.view(scenery), lambda v: 40 * v.distance.size)
+        return self._once("paths", key, lambda: seen.view(scenery), lambda view: 40 * view.distance.size)
 
     def model(self, seen: Seen, scenery: Scenery, layer: int, ends: Ends | None = None) -> FogModel:
         """Return the paths of a layer of an image in a scenery, 0: airlight, 1: surfaces; `ends`: of a fog."""
         key = "model", scenery, layer, ends, _sight(seen)
         view = self.view(seen, scenery)
-        return self._once(key, lambda: seen.model(view, scenery, layer, ends), lambda model: 20 * model.places)
+        return self._once("paths", key, lambda: seen.model(view, scenery, layer, ends), lambda model: 20 * model.places)
 
     def radiance(self, seen: Seen, scenery: Scenery, fog: Fog, layer: int) -> Array:
         """Return a layer of the pixels for a fog, (m, 3) [W/(m^2 sr)]."""
         plain = fog.without_factors
         ends = fog.ends if layer == 0 else None
-        key = "radiance", scenery, plain, layer, _sight(seen)
-        by_light = self._once(
-            key, lambda: self.model(seen, scenery, layer, ends).by_light(plain), lambda each: each.size
+        key = scenery, plain, layer, _sight(seen)
+        made = self._once(
+            "radiance", key, lambda: self.model(seen, scenery, layer, ends).by_light(plain), lambda each: each.size
         )
-        return fog.combined(by_light)[layer]
+        return fog.combined(made)[layer]
 
-    def _once(self, key: Any, made: Callable[[], Any], size: Callable[[Any], int]) -> Any:
-        known = self._kept.pop(key, None)
+    def _once(self, kind: str, key: Any, made: Callable[[], Any], size: Callable[[Any], int]) -> Any:
+        kept, most = self._kept[kind], self.most if kind == "paths" else _MOST_RADIANCE
+        known = kept.pop(key, None)
         if known is None:
             value = made()
             known = value, size(value)
-            while self._kept and sum(each for _, each in self._kept.values()) > self.most - known[1]:
-                del self._kept[next(iter(self._kept))]
-        self._kept[key] = known
+            while kept and sum(each for _, each in kept.values()) > most - known[1]:
+                del kept[next(iter(kept))]
+        kept[key] = known
         return known[0]
 
 

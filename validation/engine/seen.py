@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An image that is to be explained: its values, which pixels take part, and what a fog makes of these."""
+"""An image that is to be judged or explained: which layer of it, its values, and which of its pixels take part."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -8,16 +8,18 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from analytic.errors import InputError
 from reference.quadrature.emission import emitted_light
+from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.surface import surface_hits
 from reference.scene.read import ReferenceScene, read_reference
 from reference.scene.varying import GridMedium
-from reference.storage.exr import TOTAL, Image
+from reference.storage.exr import TOTAL, Image, layer, layer_names
 from validation.arrays import Array, Bools, Index
-from validation.engine.judged_layer import AIRLIGHT, SURFACE, JudgedLayer, judged_layer
+from validation.estimates.quadrature import reference_layer
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import SAMPLES, SCENERY, Ends, Scenery, View, scattering_paths, view_of
 from validation.metrics.errors import wrong_pixels
@@ -25,7 +27,14 @@ from validation.scenes.loading import LoadedScene, load_scene
 
 Found = TypeVar("Found")  #: what an attempt at an image is
 
-PIXELS = ("centre", "area")  #: what a pixel may be: the radiance at its centre, or the mean over its area
+AIRLIGHT, SURFACE = "airlight", "surface"
+KINDS = (AIRLIGHT, SURFACE, TOTAL)  #: what a layer may hold; the total is the sum of the others
+
+# The last part of a layer's name, in small letters; Blender calls its passes VolumeDir and Volume Direct.
+_HOLDS = {AIRLIGHT: AIRLIGHT, "volumedir": AIRLIGHT, "volume direct": AIRLIGHT, SURFACE: SURFACE}
+_WHOLE = "combined"  # the last part of the name that Blender gives to all light
+PIXEL_WORDS = {"centre": "at pixel centres", "area": "means over pixels"}
+PIXELS = tuple(PIXEL_WORDS)  #: what a pixel may be: the radiance at its centre, or the mean over its area
 
 #: Pixels between those whose errors are compared: a filter that is wider than a pixel joins neighbours.
 APART = 2
@@ -38,6 +47,58 @@ _SIDE = 3  # rays along a side of a pixel, for means over its area
 _MOST_SAMPLES = 128  # of an area light
 _SETTLED = 0.005  # mean relative change of an image with twice the samples, below which there are enough
 _TRIED = 48  # pixels that say how many samples a light needs
+
+
+@dataclass(frozen=True)
+class JudgedLayer:
+    """A layer of an image."""
+
+    name: str
+    holds: str  #: 'airlight', 'surface' or 'total'
+    values: NDArray[np.floating]  #: (height, width, 3) [W/(m^2 sr)]
+    emitted: bool = True  #: whether its total shows the area lights themselves: files of our own do not
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixels]."""
+        return int(self.values.shape[1]), int(self.values.shape[0])
+
+
+def judged_layer(
+    image: Image, path: str | os.PathLike[str], *, name: str | None = None, holds: str | None = None
+) -> JudgedLayer:
+    """Return the layer to judge.
+
+    `name`: the layer: by default 'airlight' where there is one, else the plain channels, else the only layer, else the
+    only one that Blender calls Combined; `holds`: what it holds, one of `KINDS`: by default what its name says, else
+    all light.
+    """
+    if holds is not None and holds not in KINDS:
+        raise InputError(f"holds {holds}; expected one of {', '.join(KINDS)}")
+    chosen = _usual(image, path) if name is None else name or TOTAL
+    values = layer(image, chosen, path)
+    emitted = "emitted" not in image.layers and "airlight:scene" not in image.attributes
+    return JudgedLayer(chosen, holds or _HOLDS.get(chosen.rpartition(".")[2].lower(), TOTAL), values, emitted)
+
+
+def expected_layer(reference: ReferenceImage, judged: JudgedLayer) -> Array:
+    """Return the correct values of a layer, (height, width, 3) [W/(m^2 sr)]."""
+    return reference_layer(reference, judged.holds, emitted=judged.emitted)
+
+
+def _usual(image: Image, path: str | os.PathLike[str]) -> str:
+    colours = [each for each in image.layers if not each.endswith("_se")]
+    for usual in (AIRLIGHT, TOTAL):
+        if usual in colours:
+            return usual
+    whole = [each for each in colours if each.rpartition(".")[2].lower() == _WHOLE]
+    for several in (colours, whole):
+        if len(several) == 1:
+            return several[0]
+    raise InputError(
+        f"{path} has no channels R, G, B and no layer 'airlight'; it has {layer_names(image)}"
+        + ("; name one by --layer" if colours else "")
+    )
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,17 @@ from analytic.errors import InputError
 from reference.scene.read import ReferenceScene
 from reference.storage.exr import Image
 from validation.arrays import Array, Bools, Progress
-from validation.engine.judged_layer import judged_layer
 from validation.engine.prediction import Predictor, SceneLight
-from validation.engine.seen import decide_pixel, pixel_kinds, relative_errors, seen_image, stopped
+from validation.engine.seen import (
+    PIXEL_WORDS,
+    Seen,
+    decide_pixel,
+    judged_layer,
+    pixel_kinds,
+    relative_errors,
+    seen_image,
+    stopped,
+)
 from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
 from validation.fit.solve import (
     SIGMAS,
@@ -77,12 +85,12 @@ class Fit:
     @property
     def lines(self) -> list[str]:
         """The lines that `airlight compare --fit` prints beside the table of parameters."""
-        pixel = "at pixel centres" if self.pixel == "centre" else "means over pixels"
         holds = "airlight + surface" if self.holds == "total" else self.holds
         left = f"{self.left_out} of {self.pixels} pixels disagree with what explains the others, and are left out"
         lines = [
-            f"{self.path} as {holds} of {self.scene}, {pixel}: {100 * self.explained:.6g} % of its variance is "
-            f"explained; the relative rmse left is {self.residual:.3g}, the usual error of a value {self.noise:.2g}.",
+            f"{self.path} as {holds} of {self.scene}, {PIXEL_WORDS[self.pixel]}: {100 * self.explained:.6g} % of its "
+            f"variance is explained; the relative rmse left is {self.residual:.3g}, the usual error of a value "
+            f"{self.noise:.2g}.",
             left + (": look where, by airlight compare" if self.left_out > _MANY * self.pixels else "") + ".",
         ]
         if self.explained < _BAD:
@@ -116,7 +124,7 @@ def fit_image(
     `loaded`: the scene, at the size of the image: geometry, camera and lights are taken from it, and what is not looked
     for; `parameters`, `starts`: what is looked for, see `validation.fit.unknowns`, and values to begin with; the
     scene's own by default; `layer`, `holds`: which layer, and what it holds, see
-    `validation.engine.judged_layer.judged_layer`; `pixel`: 'centre' or 'area'; by default what the image says of
+    `validation.engine.seen.judged_layer`; `pixel`: 'centre' or 'area'; by default what the image says of
     itself, or what fits better; `mask`: which pixels may take part, (height, width); all by default.
 
     Valid for single scattering: homogeneous media and height fog, point and spot lights, directional ones where media
@@ -139,7 +147,7 @@ def fit_image(
 
     def solved(kind: str) -> _Solved:
         tell = None if progress is None else _stage(progress, kinds.index(kind), len(kinds))
-        return _solved(Predictor(replace(seen, area=kind == "area"), SceneLight(seen.reference)), unknowns, tell)
+        return _solved(_predictor(replace(seen, area=kind == "area")), unknowns, tell)
 
     kind, found = decide_pixel(
         kinds,
@@ -149,6 +157,11 @@ def fit_image(
     )
     fit = _fit((loaded.name, path, judged.holds, kind.pixel), unknowns, found)
     return replace(fit, seconds=took().seconds, failures=wrong)
+
+
+def _predictor(seen: Seen) -> Predictor:
+    """Return what predicts an image; every evaluation needs all its paths, so none are dropped."""
+    return Predictor(seen, SceneLight(seen.reference, most=math.inf))
 
 
 def _stage(progress: Progress, number: int, count: int) -> Progress:
@@ -169,7 +182,7 @@ def _solved(predictor: Predictor, unknowns: tuple[Unknown, ...], progress: Progr
     if progress is not None:
         progress(0.5, "lit intervals")
     # Paths cost more than what is done with them: starts have some of their own where these are far fewer.
-    few = Predictor(replace(predictor.seen, rays=_FEW_RAYS), predictor.light)
+    few = _predictor(replace(predictor.seen, rays=_FEW_RAYS))
     start = best_start(Model.of(few, unknowns) if len(model.image) > _FEWER * few.seen.most_pixels else model)
     groups = confounded_groups((model.slopes(start) / model.relative[:, :, None]).reshape(-1, len(unknowns)))
     free = ~np.isin(np.arange(len(unknowns)), [number for group in groups for number in group.held])
@@ -187,7 +200,7 @@ def _solved(predictor: Predictor, unknowns: tuple[Unknown, ...], progress: Progr
         still = np.maximum(_STILL * _size(predictor.reference), _STILL_IN_NOISE * error)
         if turn + 1 == turns or (turn and np.all(step < still)):
             break
-        model = replace(model, at=inner)
+        model = replace(model, at=inner, predictor=_predictor(predictor.seen))
     return _Solved(model, free, groups, solution)
 
 

@@ -26,8 +26,7 @@ from reference.storage.exr import NOTE, read_exr
 from reference.storage.files import temporary_folder
 from validation.arrays import Array, Bools, Index, Progress
 from validation.engine.judge import lamp_distance, relative_bound
-from validation.engine.judged_layer import JudgedLayer, expected_layer, judged_layer
-from validation.engine.seen import PIXELS, pixel_kinds, scene_of_size
+from validation.engine.seen import PIXELS, JudgedLayer, expected_layer, judged_layer, pixel_kinds, scene_of_size
 from validation.estimates.quadrature import reference_image
 from validation.motion.blocks import BLOCK, told
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames

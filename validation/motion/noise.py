@@ -43,8 +43,7 @@ from reference.storage.exr import read_exr
 from validation.arrays import Array, Progress
 from validation.engine.images import image_times
 from validation.engine.judge import fitting_kind, references, relative_bound
-from validation.engine.judged_layer import expected_layer, judged_layer
-from validation.engine.seen import pixel_kinds, scene_of_size
+from validation.engine.seen import expected_layer, judged_layer, pixel_kinds, scene_of_size
 from validation.motion.blocks import Estimate, parts_of_error, told
 from validation.statistics.samples import student, student_quantile
 

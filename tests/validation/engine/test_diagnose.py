@@ -19,11 +19,10 @@ from tests.helpers.scenes import FOG, scene_xml
 from validation.engine.diagnose import diagnose_image
 from validation.engine.evidence import is_noise
 from validation.engine.fault import Fault
-from validation.engine.judged_layer import judged_layer
 from validation.engine.light_faults import PLACE
 from validation.engine.prediction import Guess, SceneLight
 from validation.engine.search import Explanation, _Search
-from validation.engine.seen import seen_image
+from validation.engine.seen import judged_layer, seen_image
 from validation.fog_model.radiance import FogModel, scene_fog
 from validation.fog_model.view import Scenery, scattering_paths, view_of
 from validation.scenes.loading import load_scene

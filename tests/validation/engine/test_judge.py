@@ -14,8 +14,7 @@ from validation.engine.error_place import error_place
 from validation.engine.hints import find_hints
 from validation.engine.images import EngineImage, measure_image
 from validation.engine.judge import compare_scene, judge, references
-from validation.engine.judged_layer import expected_layer, judged_layer
-from validation.engine.seen import seen_image
+from validation.engine.seen import expected_layer, judged_layer, seen_image
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer
 from validation.scenes.loading import load_scene
 
