@@ -47,7 +47,7 @@ class Number:
     high: float
     starts: tuple[float, ...] = (1.0,)
     scale: str = "plain"  #: one of `SCALES`
-    #: Of differences, for what moves paths: each guess costs new ones, and few must do; 0: it does not.
+    #: The step of differences, for what moves paths: each guess costs new ones, and few must do; 0: it does not.
     step: float = 0.0
     stride: float = 0.0  #: of the first search along the axes, for what moves shadows; 0: there is none
 
