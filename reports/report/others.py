@@ -85,11 +85,10 @@ def known_kernels(rays: int) -> list[Stability]:
 # --- growth ----------------------------------------------------------------------------------------------------------
 
 
-@kept("report-scaling", "validation.study.growth", "validation.study.ladders")
+@kept("report-scaling", "validation.study.growth")
 def _scaling(kind: str, study: Study, machine: Mapping[str, str], *, progress: Progress) -> list[Scaling]:
     """Return how times grow with one kind of work."""
-    from validation.study.growth import study_growth
-    from validation.study.ladders import ladder
+    from validation.study.growth import ladder, study_growth
 
     return study_growth(study, kind, ladder(kind, study.scenes[0], study.sizes[0]), progress=counted(progress))
 

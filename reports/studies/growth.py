@@ -53,8 +53,7 @@ def scaling(
     """
     from reports.api.render import asked_configurations
     from reports.tables.costs import cliffs, scaling_tables
-    from validation.study.growth import study_growth
-    from validation.study.ladders import ladder
+    from validation.study.growth import ladder, study_growth
     from validation.study.study import GROWTH, standard_study
 
     usual = standard_study("scaling")

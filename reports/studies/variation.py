@@ -11,8 +11,7 @@ from reports.studies.registry import FRACTION, Study, with_environment
 from reports.tables.table import Interval, numbers, table, words
 
 if TYPE_CHECKING:
-    from validation.study.motion import MethodMotion
-    from validation.study.noise import MethodNoise
+    from validation.study.variation import MethodMotion, MethodNoise
 
 
 _GOAL = 0.01  # error, until which the time is given
@@ -53,7 +52,7 @@ def noise(
     from reports.api.scenes import opened
     from validation.motion.noise import BLURS, time_words
     from validation.study.configuration import named_configurations
-    from validation.study.noise import method_noise
+    from validation.study.variation import method_noise
 
     chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("noise"))
     loaded = opened(scene, pixels_of(size))
@@ -167,7 +166,7 @@ def motion(
     from reports.api.render import asked_configurations
     from reports.api.scenes import opened
     from validation.study.configuration import named_configurations
-    from validation.study.motion import method_motion
+    from validation.study.variation import method_motion
 
     chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("motion"))
     loaded = opened(scene, pixels_of(size))

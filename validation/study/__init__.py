@@ -17,8 +17,6 @@ Read in this order:
 - `rows.py`: finished rows on disk, and their Parquet;
 - `cost.py`: what a command will take, and the question before it starts;
 - `causes.py`: the error of an image by its causes, which add up to it;
-- `noise.py`: independent runs of methods that draw random numbers;
-- `motion.py`: methods under a light that moves, frame by frame;
-- `ladders.py`: a scene with less and more of one kind of work, meshes with four times the triangles among it;
-- `growth.py`: the exponents with which times grow with the work.
+- `variation.py`: independent runs of methods that draw random numbers, and frames under a light that moves;
+- `growth.py`: a scene with less and more of one kind of work, and the exponents with which times grow with it.
 """

@@ -1,5 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the times of rows grow with the work of a scene.
+"""How times grow with the work of a scene, which has less and more of one kind of work, step by step.
+
+| kind | work | what changes |
+|---|---|---|
+| `size` | pixels | the image has half, twice and four times the width and height |
+| `triangles` | triangles of opaque meshes | each is cut into four, with bumps (see below) |
+| `lights` | lights without extent | each stands beside itself again, with its fraction of the intensity |
+| `map` | texels on a side of a shadow map | the parameter `map` |
+
+The other kinds keep the image at the size that is asked for.
+
+A flat triangle cut into four has no new silhouette. All vertices therefore move by one smooth map of space,
+
+    u(p) = p + sum_i a_i sin(k_i . p + i),     |a_i| |k_i| = 0.15,     i = 1 .. 4,
+
+with wavelengths from a quarter to a thirtieth of the scene's size. The norms of its derivative less the identity add
+up to 0.6 < 1: it is one to one, so that closed meshes stay closed, and what was disjoint is disjoint. Its bumps turn
+smooth outlines into silhouettes of which more and more edges are found as triangles shrink below the wavelengths, about
+the root of their number. Equal places move equally, so that seams of doubled vertices stay closed. Bounds of media and
+area lights stay as they are: they must be convex, or of their shape.
 
 A column t = t_0 w^e of the work w has the exponent e, the slope of log t over log w by least squares. The constant cost
 of a frame makes the exponent of a time smaller. Between two steps a time may grow at most as
@@ -15,8 +34,9 @@ A step that is steeper by more than `CLIFF` is a cliff, where it takes longer th
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,12 +45,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import linregress
 
-from validation.arrays import Counted
+from analytic.errors import InputError
+from realtime.scene.animate import turned_light
+from realtime.scene.lights import Light
+from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
+from realtime.scene.read_scene import Scene, read_scene
+from validation.arrays import Array, Counted
 from validation.columns import record_of
-from validation.study.ladders import Step
+from validation.scenes.loading import load_scene
+from validation.scenes.meshes import divided, rotation
+from validation.scenes.parts import mesh_with_material
 from validation.study.row import Row
 from validation.study.run import run
-from validation.study.study import Cell, Study
+from validation.study.study import GROWTH, Cell, Study
 from validation.timing import Scaling, TimeGrowth
 
 TIMES = ("frame", "light_moved", "objects_moved")
@@ -43,10 +70,144 @@ USUAL = {
     "lights": (1.0, 1.0, 1.0),
     "map": (1.0, 2.0, 2.0),
 }
+MOST_TRIANGLES = 5_300_000  #: a mesh of so many takes some gigabytes with what is made of it
+_SIDES = (0.5, 1, 2, 4)  # of the image
+_COPIES = (1, 2, 4, 8)  # of each light
+_MAPS = (128, 256, 512, 1024, 2048)
+_ASIDE = 0.07  # between the copies of a light, as a fraction of its distance from the camera
+_WAVES = ((3.1, 2.3, -1.1), (-5.3, 6.7, 3.7), (11.3, -7.9, 9.1), (-17.3, 15.1, 13.9))  # along the size of the scene
+_STEEPNESS = 0.15
+_TURN = 2.3  # between the copies of a light from infinity [degrees]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A scene with some work."""
+
+    work: float  #: of its kind
+    scene: Callable[[], Scene]
+    parameters: Mapping[str, Any] = field(default_factory=dict)  #: of the method, beside the configuration's own
+
+
+def ladder(kind: str, name_or_path: str, size: tuple[int, int]) -> list[Step]:
+    """Return the steps of a kind of work, of `GROWTH`, for a scene at a size [pixels], the least work first.
+
+    A scene that has nothing of the kind of which there could be less or more is refused.
+    """
+    makers = {"size": _sizes, "triangles": _triangles, "lights": _lights, "map": _maps}
+    if kind not in makers:
+        raise InputError(f"scaling: got {kind!r}, expected some of {', '.join(GROWTH)}, with commas between them")
+    return makers[kind](name_or_path, size)
+
+
+def _sizes(name: str, size: tuple[int, int]) -> list[Step]:
+    width, height = size
+    sizes = [(max(1, round(width * factor)), max(1, round(height * factor))) for factor in _SIDES]
+    return [Step(at[0] * at[1], partial(_read, name, at)) for at in sizes]
+
+
+def _read(name: str, size: tuple[int, int]) -> Scene:
+    return read_scene(load_scene(name, size).scene)
+
+
+def _triangles(name: str, size: tuple[int, int]) -> list[Step]:
+    count = triangles_of(load_scene(name, size).scene)
+    levels = [level for level in range(10) if 0 < count * 4**level <= MOST_TRIANGLES]
+    if len(levels) < 2:
+        raise InputError(
+            f"scaling triangles: {name} has {count} triangles of opaque meshes; expected some, and four times as many "
+            f"not more than {MOST_TRIANGLES}; use another scene"
+        )
+    return [Step(count * 4**level, partial(_finer, name, size, level)) for level in levels]
+
+
+def _finer(name: str, size: tuple[int, int], level: int) -> Scene:
+    return read_scene(subdivided(load_scene(name, size).scene, level))
+
+
+def _lights(name: str, size: tuple[int, int]) -> list[Step]:
+    scene = _read(name, size)
+    count = len(scene.lights)
+    if not count:
+        raise InputError(f"scaling lights: {name} has area lights only; expected a point, spot or directional one")
+    return [Step(count * copies, partial(with_copies, scene, copies)) for copies in _COPIES]
+
+
+def with_copies(scene: Scene, copies: int) -> Scene:
+    """Return a scene in which each light without extent stands several times, with its fraction of the intensity."""
+    here = np.array(scene.camera.origin, dtype=np.float64).ravel()
+    lights = tuple(_copy(light, number, copies, here) for light in scene.lights for number in range(copies))
+    kinds = [light.kind for light in lights]
+    counts: dict[str, Any] = {f"{kind}_lights": kinds.count(kind) for kind in ("point", "spot", "directional")}
+    return replace(scene, lights=lights, features=replace(scene.features, **counts))
+
+
+def _copy(light: Light, number: int, copies: int, camera) -> Light:
+    light = replace(light, intensity=light.intensity / copies)
+    if number == 0:
+        return light
+    position = np.array(light.position, dtype=np.float64).ravel()
+    if light.extent is not None:
+        return turned_light(light, position, rotation((0.31, 0.53, 0.79), _TURN * number))
+    step = _ASIDE * np.linalg.norm(position - camera)
+    aside = step * number**0.5 * np.array([np.cos(2.4 * number), np.sin(2.4 * number), 0.3 * np.cos(1.7 * number)])
+    return replace(light, position=type(light.position)(*(float(c) for c in position + aside)))
+
+
+def _maps(name: str, size: tuple[int, int]) -> list[Step]:
+    return [Step(side, partial(_read, name, size), {"map": side}) for side in _MAPS]
+
+
+def triangles_of(scene) -> int:
+    """Return how many triangles the meshes of a Mitsuba scene have that `subdivided` cuts."""
+    return sum(int(shape.face_count()) for shape in scene.shapes() if _is_cut(shape))
+
+
+def subdivided(scene, levels: int) -> Any:
+    """Return a Mitsuba scene whose opaque meshes, if any, have 4^levels times the triangles, and bumps."""
+    if not triangles_of(scene):
+        raise InputError("triangles: the scene has no opaque meshes, which alone can have more triangles; use another")
+    box = scene.bbox()
+    low, high = (np.array(corner, dtype=np.float64) for corner in (box.min, box.max))
+    shapes = [_cut(shape, levels, low, float(np.linalg.norm(high - low))) for shape in scene.shapes()]
+    return with_shapes(scene, shapes)
+
+
+def with_shapes(scene, shapes: Iterable[Any]) -> Any:
+    """Return a Mitsuba scene of other shapes, with the camera and the lights without extent of one."""
+    emitters = (emitter for emitter in scene.emitters() if emitter.class_name() != "AreaLight")
+    parts = {f"emitter-{number}": emitter for number, emitter in enumerate(emitters)}
+    return scene_of(list(shapes), {"sensor": scene.sensors()[0]} | parts)
+
+
+def _cut(shape, levels: int, corner: Array, size: float) -> Any:
+    if not _is_cut(shape):
+        return shape
+    mesh = mesh_triangles(shape)
+    for _ in range(levels):
+        mesh = divided(mesh)
+    vertices, faces = mesh
+    cut = mesh_with_material(shape.id(), (bumpy(vertices, corner, size), faces), shape.bsdf())
+    cut.set_id(shape.id())
+    return cut
+
+
+def bumpy(points: Array, corner: Array, size: float) -> Array:
+    """Return points (n, 3) after the map of space above, for a scene of a `size` from a `corner` on [m]."""
+    moved = points.copy()
+    for number, wave in enumerate(np.asarray(_WAVES) * (2 * np.pi / size), 1):
+        across = np.cross(wave, (0.31, 0.53, 0.79))
+        height = _STEEPNESS / np.linalg.norm(wave)
+        moved += height * across / np.linalg.norm(across) * np.sin((points - corner) @ wave + number)[:, None]
+    return moved
+
+
+def _is_cut(shape) -> bool:
+    return shape.is_mesh() and not shape.is_emitter() and shape.bsdf().class_name() != "Null"
 
 
 def study_growth(study: Study, kind: str, steps: Sequence[Step], *, progress: Counted | None = None) -> list[Scaling]:
-    """Measure how methods grow with a kind of work, in steps of `validation.study.ladders.ladder`, in the first scene.
+    """Measure how methods grow with a kind of work, in steps of `ladder`, in the first scene.
 
     A method ends at the first step that it refuses.
     """

@@ -75,7 +75,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Growth:
-    """A step of a kind of work, of which there is more and less (`validation.study.ladders`)."""
+    """A step of a kind of work, of which there is more and less (`validation.study.growth`)."""
 
     kind: str = column("work", meaning="'size', 'triangles', 'lights' or 'map'")
     amount: float = column("amount", "1", "pixels, triangles, lights, or texels on a side of the map")

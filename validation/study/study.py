@@ -16,7 +16,7 @@ before any work. The measurements of a report are a study too (`validation/study
     slow = 0.04                                             # a longer frame is timed stage by stage [s]
     frame_limit = 10                                        # a cell is left out if a frame would take longer [s]
     stability = 10_000                                      # rays on which kernels are tried
-    growth = ["size", "map"]                                # by which work times are to grow (`ladders.py`)
+    growth = ["size", "map"]                                # by which work times are to grow (`growth.py`)
 
     [checks]                                                # of the references
     size = "64x48"
@@ -103,7 +103,7 @@ class Cell:
     medium: tuple[str, ...]  #: changes of the medium, as `parse_changes` reads them
     chosen: Configuration
     measure: Measure = Measure()
-    work: tuple[str, float] | None = None  #: kind and amount, of a step of `validation.study.ladders`
+    work: tuple[str, float] | None = None  #: kind and amount, of a step of `validation.study.growth`
 
     @property
     def image(self) -> "Cell":

@@ -13,7 +13,7 @@ from tests.helpers.scenes import tiny_scene
 from validation.scenes.meshes import grid, icosphere, rotation
 from validation.scenes.parts import mitsuba_mesh
 from validation.study.configuration import configuration, prepared
-from validation.study.ladders import bumpy
+from validation.study.growth import bumpy
 
 
 def host(array) -> np.ndarray:

@@ -16,8 +16,7 @@ from validation.clock import peak_memory, time_in_turns, time_repeated
 from validation.study import frame_times as timing
 from validation.study.configuration import configuration
 from validation.study.frame_times import time_frame
-from validation.study.growth import growth, study_growth
-from validation.study.ladders import ladder, subdivided, triangles_of
+from validation.study.growth import growth, ladder, study_growth, subdivided, triangles_of
 from validation.study.study import Measure, Study
 
 

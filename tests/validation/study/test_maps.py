@@ -47,7 +47,7 @@ from validation.scenes.registry import Animation
 from validation.study.causes import decompose
 from validation.study.configuration import Configuration, configuration, named_configurations, prepared
 from validation.study.growth import fitted_exponent
-from validation.study.motion import light_references, method_motion
+from validation.study.variation import light_references, method_motion
 
 # Steps enough that halving them changes no error below by more than 2 %.
 MARCH = {"steps": 1000, "shadow": "map"}

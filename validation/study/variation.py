@@ -1,34 +1,88 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Methods under a light that moves: the frames of each against the reference of each frame.
+"""Errors that vary: of independent runs of one frame, and of the frames under a light that moves.
 
-In a sweep the lights circle as in the animation of the scene; in a step they stand for `BEFORE` frames, then jump. A
-method that keeps something of its last frames gets it, as in `airlight render --frames`. Methods that draw random
-numbers are rendered in several runs: their numbers are means over these, with errors from the spread of the runs.
+*Runs.* The reference has no noise: the error of runs is bias and noise apart. Methods that draw no random numbers are
+rendered once, and stand beside the others: all of their error is bias.
+
+*Frames.* Each is held against its own reference. In a sweep the lights circle as in the animation of the scene; in a
+step they stand for `BEFORE` frames, then jump. A method that keeps something of its last frames gets it, as in
+`airlight render --frames`. Methods that draw random numbers are rendered in several runs: their numbers are means over
+these, with errors from the spread of the runs.
 """
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from analytic.errors import InputError
-from realtime.frame.renderer import FrameRenderer
+from realtime.frame.renderer import FrameRenderer, render_frame
 from realtime.scene.read_scene import Scene, read_scene
 from validation.arrays import Array, Counted
 from validation.estimates.quadrature import reference_image
 from validation.motion.judge import motion_verdict
 from validation.motion.measures import Measures, mean_measures, measure
 from validation.motion.measures import Sequence as Frames
+from validation.motion.noise import Noise, measure_noise
 from validation.scenes.animation import animate, frame_changes
 from validation.scenes.changes import change_scene
 from validation.scenes.registry import Animation
 from validation.study.configuration import Configuration, prepared
-from validation.study.frame_times import timed_image
+from validation.study.frame_times import brief_times, timed_image
 
+_SURE = 2.0  # standard errors, below which the mean of the runs is not told from the reference
 BEFORE = 8  #: frames at rest before a step
 _JUMP = 12  # of a turn, that a step is
+
+
+@dataclass(frozen=True)
+class MethodNoise:
+    """The noise of independent renders by a method."""
+
+    label: str
+    noise: Noise
+    reference: Array = field(repr=False)  #: (height, width, 3) [W/(m^2 sr)]
+    mean: Array = field(
+        repr=False
+    )  #: of the runs; the reference where it is within two standard errors, (height, width, 3)
+    deviation: Array = field(repr=False)  #: of a run, (height, width, 3) [W/(m^2 sr)]
+
+
+def method_noise(
+    scene: Any,
+    configurations: Sequence[Configuration],
+    *,
+    runs: int = 16,
+    progress: Counted | None = None,
+) -> list[MethodNoise]:
+    """Return the noise of each configuration's airlight.
+
+    `scene`: the `mi.Scene`, at its own size; `runs`: of a method that draws random numbers, at least two. The time of a
+    frame is a median while nothing moves. Raises InputError for fewer runs and a dark reference.
+    """
+    if runs < 2:
+        raise InputError(f"runs: got {runs}, expected at least two")
+    read, reference = read_scene(scene), reference_image(scene).airlight
+    found = []
+    for number, chosen in enumerate(configurations):
+        renderer = prepared(read, chosen)
+        count = runs if renderer.method.noisy else 1
+        images = []
+        for run in range(count):
+            if progress is not None:
+                progress(number * runs + run, len(configurations) * runs, chosen.label)
+            images.append(np.asarray(render_frame(replace(renderer, run=run)).airlight, dtype=np.float64))
+        seconds = brief_times(renderer)[0].frame.median_ms / 1e3
+        if all(np.array_equal(each, images[0]) for each in images[1:]):
+            images = images[:1]
+        mean, deviation = np.mean(images, axis=0), np.std(images, axis=0, ddof=min(1, len(images) - 1))
+        told = np.abs(mean - reference) > _SURE / math.sqrt(count) * deviation
+        noise, shown = measure_noise(reference, images, seconds), np.where(told, mean, reference)
+        found.append(MethodNoise(chosen.label, noise, reference, shown, deviation))
+    return found
 
 
 @dataclass(frozen=True)
