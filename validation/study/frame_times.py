@@ -2,13 +2,14 @@
 """The times of a frame and of its stages, and of frames after light, objects or colours changed."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.clock import Spent, stopwatch
+from analytic.clock import Spent
 from realtime.frame.incremental import FrameCache, next_frame, next_parts
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.renderer import (
@@ -109,12 +110,6 @@ def time_frame(
     by_light = run_shade(renderer, cast)
     dr.eval(cast, by_light)
 
-    def airlight():
-        dr.eval(run_method(renderer, state, cast, by_light))
-
-    def surface():
-        dr.eval(run_cast_and_shade(renderer))
-
     objects = _objects(scene)
 
     def objects_moved():
@@ -127,8 +122,8 @@ def time_frame(
 
     return FrameTimes(
         frame=time_repeated(lambda: run_stages(renderer, state), seconds=seconds),
-        surface=time_repeated(surface, seconds=seconds),
-        airlight=time_repeated(airlight, seconds=seconds),
+        surface=time_repeated(partial(_ready, run_cast_and_shade, renderer), seconds=seconds),
+        airlight=time_repeated(partial(_ready, run_method, renderer, state, cast, by_light), seconds=seconds),
         light_moved=few(moved_light(renderer)),
         objects_moved=few(objects_moved),
         light_moved_camera_cached=few(_step(renderer, cache, light_moved=True)),
@@ -183,37 +178,33 @@ def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
             there, move = timed(lambda: turned_objects(renderer.scene, objects, np.eye(3)))
     steps = []
     for _ in range(turns):
-        times, took = [0.0], stopwatch()
-
-        def done(times: list[float] = times, took: Callable[[], Spent] = took) -> None:
-            dr.sync_thread()
-            times.append(took().ms)
-
-        state = renderer.prepare(there)
-        done()
+        state, prepare = timed(partial(renderer.prepare, there))
         of_parts = np.zeros(3)
         for part in in_parts:
-            cast, by_light = run_cast_and_shade(part)
-            dr.eval(cast, by_light)
-            done()
-            dr.eval(run_shade(part, cast))
-            done()
-            dr.eval(run_method(part, state, cast, by_light))
-            done()
-            of_parts += np.diff(times[-4:])
-        steps.append([times[1], *of_parts])
-    prepare, surface, shade, airlight = np.array(steps).T
+            (cast, by_light), surface = timed(partial(_ready, run_cast_and_shade, part))
+            shade = timed(partial(_ready, run_shade, part, cast))[1]
+            airlight = timed(partial(_ready, run_method, part, state, cast, by_light))[1]
+            of_parts += surface.ms, shade.ms, airlight.ms
+        steps.append([prepare.ms, *of_parts])
+    prepares, surfaces, shades, airlights = np.array(steps).T
     needed = renderer.method.prepared_from
-    light_moved = prepare + surface + airlight
+    light_moved = prepares + surfaces + airlights
     return FrameTimes(
-        frame=timing_of(surface + airlight),
-        surface=timing_of(surface),
-        airlight=timing_of(airlight),
+        frame=timing_of(surfaces + airlights),
+        surface=timing_of(surfaces),
+        airlight=timing_of(airlights),
         light_moved=timing_of(light_moved),
         objects_moved=timing_of(move.ms + light_moved),
-        light_moved_camera_cached=timing_of(shade + airlight + prepare * bool(needed & {"light", "look"})),
-        colours_changed=timing_of(shade + airlight + prepare * ("look" in needed)),
+        light_moved_camera_cached=timing_of(shades + airlights + prepares * bool(needed & {"light", "look"})),
+        colours_changed=timing_of(shades + airlights + prepares * ("look" in needed)),
     )
+
+
+def _ready(stage: Callable[..., Any], *given: Any) -> Any:
+    """Return what a stage gives, evaluated."""
+    result = stage(*given)
+    dr.eval(result)
+    return result
 
 
 def _objects(scene: Scene) -> Objects | None:
