@@ -2,8 +2,8 @@
 """The reference of an image: the values of the rays through pixel centres, or means over the areas of pixels.
 
 A mean over a pixel is a sum over positions in it: eight replicates of a scrambled net, whose spread is the standard
-error, and a pilot that says how many positions a pixel needs (`reference.quadrature.replicates`). All pixels share the
-positions, so that the spread of the mean of an image is known, too. Near a light the radiance grows as one over the
+error, and a pilot that says how many positions a pixel needs. Each pixel has positions of its own, so that errors
+average out over an image (`reference.quadrature.replicates`). Near a light the radiance grows as one over the
 distance to it on the film: the mean over an area is finite. Under area lights each replicate has samples of its own of
 them, and its spread is that of both.
 """
@@ -21,11 +21,10 @@ from reference.quadrature.replicates import (
     REPLICATES,
     Keep,
     PointPlan,
+    RayPoints,
     replicate_means,
-    square_points,
     standard_error,
 )
-from reference.quadrature.stretches import sums_of
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import ReferenceScene
 from reference.scene.shapes import read_shapes
@@ -120,27 +119,30 @@ def _means(
 
     def sums(part: str, chosen: PointPlan, active: Index) -> Array:
         nonlocal done
+        points = RayPoints.of(chosen, 0, len(corner), "pixel")
+        step = max(1, _CHUNK // (len(groups[0]) * chosen.most))
         total = []
         for group in groups:
-            square = np.stack([square_points(chosen, 0, replicate, "pixel") for replicate in group])
-            positions = (corner[active, None] + square[:, None]).reshape(-1, 2)
-            owner = np.repeat(np.arange(len(group) * len(active)), square.shape[1])
-            of_lights = replace(lights, seed=chosen.seed * REPLICATES + group[0] + (chosen.most << 16))
             parts = []
-            for first in range(0, len(positions), _CHUNK):
-                direction = film_directions(sensor, positions[first : first + _CHUNK], size)
+            for first in range(0, len(active), step):
+                pixels = active[first : first + step]
+                square = points[pixels].reshape(len(pixels), REPLICATES, chosen.most, 2)[:, group]
+                positions = (corner[pixels, None, None] + square).reshape(-1, 2)
+                seeds = np.random.default_rng((chosen.seed, chosen.most, group[0], first))
+                of_lights = replace(lights, seed=int(seeds.integers(1 << 62)))
+                direction = film_directions(sensor, positions, size)
                 ray = ray_values(replace(reference, direction=direction), plan=of_lights, shapes=shapes, **how)
                 emitted = ray.emitted.reshape(len(direction), -1)
-                parts.append(np.concatenate([ray.airlight, ray.surface, emitted], axis=1))
+                values = np.concatenate([ray.airlight, ray.surface, emitted], axis=1)
+                parts.append(values.reshape(*square.shape[:3], -1).sum(axis=2))
                 if part != PILOT:
-                    np.add.at(bounds, active[owner[first : first + _CHUNK] % len(active)], ray.bound)
+                    bounds[pixels] += ray.bound.reshape(len(pixels), -1, 3).sum(axis=1)
                     checks.append(ray.random_checks)
-            found = sums_of(owner, np.concatenate(parts), len(group) * len(active))
-            total.append(found.reshape(len(group), len(active), -1))
+            total.append(np.concatenate(parts))
             done += 1
             if progress is not None:
                 progress(done, rounds, "positions in pixels")
-        return np.moveaxis(np.concatenate(total), 0, -1)
+        return np.moveaxis(np.concatenate(total, axis=1), 1, 2)
 
     centre = ray_values(reference, plan=lights, shapes=shapes, **how)
     chosen = replace(_POSITIONS, error=tolerance, seed=seed)

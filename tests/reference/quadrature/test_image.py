@@ -11,6 +11,7 @@ from scipy.integrate import quad
 
 from reference.quadrature.image import quadrature_image
 from reference.quadrature.ray_values import ray_values
+from reference.quadrature.replicates import PointPlan, standard_error
 from reference.scene.camera import film_directions
 from reference.scene.read import read_reference
 from tests.helpers.polygons import box_scene
@@ -96,6 +97,9 @@ def test_surface_is_mitsubas_direct_integrator(variant, kind):
 # Means over the area of pixels ---------------------------------------------------------------------------------------
 
 
+OUT_OF_VIEW = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
+
+
 def scene_of(scene):
     return read_reference(mi.load_dict(scene))
 
@@ -120,8 +124,7 @@ def brute_force(reference, n, regular=False):
 @pytest.mark.claim("pixel-area", tolerance="7.1 standard errors of 1e-4 relative, which a pilot foresees")
 def test_smooth_fog_is_the_integral_over_the_pixel(variant):
     """Gauss's product rule with 12 x 12 points, converged for what is smooth: the light is out of view."""
-    lamp = {"type": "point", "position": [3.9, 0.7, 3.9], "intensity": {"type": "rgb", "value": [5.0, 4.0, 3.0]}}
-    reference = scene_of(tiny_scene(ball=None, floor=None, lamp=lamp, size=(4, 3)))
+    reference = scene_of(tiny_scene(ball=None, floor=None, lamp=OUT_OF_VIEW, size=(4, 3)))
     node, weight = np.polynomial.legendre.leggauss(12)
     node, weight = 0.5 * (node + 1), 0.5 * weight
     row, column = np.divmod(np.arange(12), 4)
@@ -159,6 +162,22 @@ def test_edges_against_brute_force(variant, scene):
     assert np.abs(image.surface.mean() / surface.mean() - 1) < 0.01
     centre = quadrature_image(reference, checks=1)
     assert np.abs(centre.airlight - airlight)[~near].max() > 5 * error.max()  # the centre is another thing
+
+
+def test_errors_of_pixels_average_out(variant):
+    """The variance of the mean over 192 pixels by that of uncorrelated errors is chi^2_7/7: 0.09 to 3.5 in 99.8 %.
+
+    If pixels shared positions it would be 80. Two seeds differ by 7.1 standard errors once in 10 000.
+    """
+    reference = scene_of(tiny_scene(ball=None, lamp=OUT_OF_VIEW, size=(16, 12)))
+    images = [quadrature_image(reference, pixel="area", checks=1, plan=PointPlan(seed=seed)) for seed in (1, 2)]
+    errors = [standard_error(image.replicate_means[0].T)[0] for image in images]
+    for image, error in zip(images, errors, strict=True):
+        alone = np.sqrt(np.sum(image.airlight_se[..., 0] ** 2)) / 192
+        assert 0.09 < (error / alone) ** 2 < 3.5
+    one, other = (image.airlight[..., 0].mean() for image in images)
+    assert one != other
+    assert abs(one - other) < 7.1 * np.hypot(*errors)
 
 
 def test_a_light_in_the_middle_of_a_pixel_has_a_finite_mean(variant):
