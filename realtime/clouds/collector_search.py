@@ -56,8 +56,8 @@ c to p: where both are large it is no contraction, and steps overshoot.
   - exp(-T))/(1 - exp(-L)), as if its source were uniform. Where the ray leaves the slab through the lit face (mu < 0),
   p lies |mu| T deep at least, as there is cloud so far. With the paper's L silhouettes of thin parts are too bright,
   and slopes that face away from the sun are black.
-* *End*. After `iterations` steps; or in those rays that take no more than a fraction `settled` of sigma as their step.
-  The light is that of the last slab: F gives it with the place and the width.
+* *End*. After `iterations` steps, or where a step has no length. The light is that of the last slab: F gives it with
+  the place and the width.
 
 The distance |F - c'| / sigma of the last step says how far the search is from its end: `CollectorLight.missed`.
 
@@ -171,7 +171,6 @@ class CollectorLight:
     collector: Collector
     radiance: Any  #: for unit irradiance across the beam [1/sr]
     missed: Any  #: distance from the fixed point [`Collector.width`]
-    steps: Any  #: how many were taken
 
 
 @dataclass(frozen=True)
@@ -179,7 +178,6 @@ class Search:
     """How collectors are searched."""
 
     iterations: int = 10
-    settled: float = 0.0  #: step at which a ray has found its collector [`Collector.width`]; 0: none has
     along_light: bool = False  #: whether slabs are as thick as the cloud is along the light, as printed
     covered: bool = True  #: whether light enters only where the map has cloud
 
@@ -242,7 +240,7 @@ def collector_light(
         fraction = dr.minimum(weight, new_width / dr.maximum(distance, 1e-20))
         moved = dr.fma(way, fraction, projected)
         relative = distance / new_width
-        return index + 1, relative > search.settled, moved, new_width, way, weight, found, relative
+        return index + 1, relative > 0, moved, new_width, way, weight, found, relative
 
     state = (
         dr.zeros(mi.UInt32, lanes),
@@ -254,13 +252,13 @@ def collector_light(
         dr.zeros(Float, lanes),
         dr.zeros(Float, lanes),
     )
-    steps, _, centre, width, _, _, radiance, missed = dr.while_loop(
+    _, _, centre, width, _, _, radiance, missed = dr.while_loop(
         state=state,
         cond=lambda index, going, *rest: going & (index < search.iterations),
         body=step,
         labels=("index", "going", "centre", "width", "last", "weight", "radiance", "missed"),
     )
-    return CollectorLight(Collector(centre, width), radiance, missed, steps)
+    return CollectorLight(Collector(centre, width), radiance, missed)
 
 
 def _reaching_behind(slab: TangentSlab, behind: Any) -> TangentSlab:

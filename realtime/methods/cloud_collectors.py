@@ -92,9 +92,6 @@ class CloudCollectors(Method):
         "a search starts at the point itself, or with the collector of the last frame",
         choices=("cold", "previous"),
     )
-    settled: float = parameter(
-        0.0, "step with which a search ends early, as a fraction of sigma; 0: all steps are taken", least=0, below=1
-    )
     transport: str = parameter(
         "grid", "the canonical transport by its grid, or by the paper's functions", choices=("grid", "fit")
     )
@@ -394,7 +391,6 @@ def _many_times(
     Float, Color = type(view.distance), type(view.medium.albedo)
     search = Search(
         parameters.iterations,
-        parameters.settled,
         parameters.thickness == "light",
         # Where a density stays below the threshold the map has no cloud, but light passes there, too.
         covered=state.body is None,

@@ -83,7 +83,7 @@ def _transported(directions, depth):
 def test_a_slab_sends_back_what_the_transport_says(variant):
     """All angles, lengths and sums over sets, colours and irradiance of the sun."""
     scene = _scene()
-    image = _airlight(scene, settled=0.02, iterations=30)
+    image = _airlight(scene, iterations=30)
     _, directions = _rays(scene)
     expected = _transported(directions, 0)
     shown = directions @ np.asarray(TURN)[:, 2] < -0.3  # rays that come down on the slab, far from its sides
@@ -129,7 +129,7 @@ def test_a_camera_in_the_cloud_is_its_point(variant):
     slab = cloud_of("slab", placed(box((2500.0, 2500.0, THICKNESS)), tuple(MIDDLE), TURN), held)
     scene = cloud_scene((16, 12), origin=tuple(inside), sun=_sun(ALONG), slab=slab)
     scene["sensor"]["medium"] = held
-    image = _airlight(scene, settled=0.02, iterations=40)
+    image = _airlight(scene, iterations=40)
     _, directions = _rays(scene)
     np.testing.assert_allclose(image[..., 0], 3.1 * _transported(directions, depth), rtol=4e-3)
 
