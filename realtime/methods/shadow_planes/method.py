@@ -43,9 +43,9 @@ from realtime.methods.shadow_planes.published_mesh import (
 )
 from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring
 from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
-from realtime.numerics.array_types import ArrayTypes, host_numbers, types_of
+from realtime.numerics.array_types import host_numbers, types_of
 from realtime.parameters import parameter
-from realtime.scene.camera import HostCamera, read_camera
+from realtime.scene.camera import read_camera
 from realtime.scene.lights import Light, host_position
 from realtime.scene.media.bounded_rays import FORMS, BoundedRays
 from realtime.scene.media.medium import LitRays
@@ -280,49 +280,22 @@ class PlanePreparation:
 
     def start(self, scene: Scene) -> Callable[[], tuple[PlaneIndex, ...]]:
         """Read what the host needs of a scene, which waits for the device; return what then finds the planes."""
-        here = self.standing(scene)
-        camera = read_camera(scene.camera)
-        types = types_of(type(scene.camera.origin.x))
-        each = [
-            plane_finder(
-                here, camera, light, cone=self.cone, order=self.order, types=types, own=scene.source_shape(light)
-            )
-            for light in scene.lights
-        ]
-        return lambda: tuple(find() for find in each)
+        here, camera = with_positions(self.occluders, scene.positions), read_camera(scene.camera)
+        types, lights = types_of(type(scene.camera.origin.x)), []
+        for light in scene.lights:
+            ring = None
+            if self.cone and light.cone is not None:
+                axis, cosine = host_numbers(light.axis, light.cos_cutoff)
+                ring = cone_ring(axis, float(cosine[0]), self.cone)
+            lights.append((host_position(light), scene.source_shape(light), ring))
 
-    def standing(self, scene: Scene) -> Occluders:
-        """Return the occluders where they are in a scene."""
-        return with_positions(self.occluders, scene.positions)
+        def planes(position: Any, own: str | None, ring: Any) -> PlaneIndex:
+            used = components_in_view(here, camera, position)
+            if own is not None:  # the light's own shape casts no shadow in it
+                used &= ~here.of_shape(own)
+            return index_planes(here, position, camera.origin, used=used, types=types, order=self.order, ring=ring)
 
-
-def plane_finder(
-    occluders: Occluders,
-    camera: HostCamera,
-    light: Light,
-    *,
-    cone: int = 0,
-    order: str = "exact",
-    types: ArrayTypes,
-    own: str | None = None,
-) -> Callable[[], PlaneIndex]:
-    """Return a function that finds the shadow planes of one light for a camera; `cone` edges bound a spot.
-
-    The shape `own` is that of the light, which casts no shadow in it.
-
-    All that is on the device is read here, and nothing else done: until then the device stands still.
-    """
-    position = host_position(light)
-    ring = None
-    if cone and light.cone is not None:
-        axis, cosine = host_numbers(light.axis, light.cos_cutoff)
-        ring = cone_ring(axis, float(cosine[0]), cone)
-
-    def find() -> PlaneIndex:
-        used = _used_components(occluders, camera, position, own)
-        return index_planes(occluders, position, camera.origin, used=used, types=types, order=order, ring=ring)
-
-    return find
+        return lambda: tuple(planes(*each) for each in lights)
 
 
 def _segments(view: View, index: PlaneIndex, rays: RayPlanes, airlight: LitRays, *, differences: bool):
@@ -334,9 +307,3 @@ def _segments(view: View, index: PlaneIndex, rays: RayPlanes, airlight: LitRays,
     zero = airlight.nothing(dr.width(view.distance))
     value, reached = sum_lit_intervals(index, rays, airlight.segment(view.distance), integral, zero)
     return airlight.radiance(value), reached
-
-
-def _used_components(occluders: Occluders, camera: HostCamera, position: Any, own: str | None) -> Any:
-    """Return by component whether its shadow can be seen; the shape `own` casts none."""
-    used = components_in_view(occluders, camera, position)
-    return used if own is None else used & ~occluders.of_shape(own)
