@@ -123,7 +123,7 @@ class View(Rays):
         """Return where the rays pass a light: foot, height, and what of them it could reach."""
         return ray_geometry(self.origin, self.aim, light)
 
-    def lit_by(self, light: Light, kernel: Any = None, *, form: str = "kernel", geometry: Any = None) -> LitRays:
+    def lit_by(self, light: Light, kernel: Any = None, *, form: str = "kernel") -> LitRays:
         """Return the rays with one light, which the medium integrates.
 
         Parameters
@@ -132,11 +132,8 @@ class View(Rays):
             One of `lights`, and an airlight kernel, or None where no integral is asked for.
         form
             In bounded media, see `realtime.scene.media.bounded.BoundedMedia.lit`.
-        geometry
-            That of the rays and the light, if it is known.
         """
-        geometry = self.geometry(light) if geometry is None else geometry
-        return self.medium.lit(self, light, geometry, kernel=kernel, form=form)
+        return self.medium.lit(self, light, self.geometry(light), kernel=kernel, form=form)
 
     def of_pixels(self, pixel: PerRay, distance: Metres) -> "View":
         """Return the view of other pixels of the image; `distance` [m] is that to their visible surfaces."""

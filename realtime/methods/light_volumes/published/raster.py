@@ -300,12 +300,11 @@ def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, l
     return type(zero)(total)
 
 
-def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: int = BATCH):
+def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel):
     """Return the airlight of one light by the triangles of its light volume [W/(m^2 sr)].
 
     `view`: the frame; its rays are those of all pixels of its camera; `light`: the light; `mesh`: its light volume,
-    closed; `kernel`: an airlight kernel function; `batch`: see
-    `realtime.methods.light_volumes.published.raster.signed_crossings`.
+    closed; `kernel`: an airlight kernel function.
 
     Valid for homogeneous media that fill all space. The number of crossings is counted on the way: not for a frozen
     function.
@@ -317,5 +316,5 @@ def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel, batch: 
     dr.scatter(lane, dr.arange(mi.UInt32, dr.width(view.pixel)), view.pixel)
     distance = view.distance
     dr.eval(airlight.geometry, lane, distance)  # every crossing reads them
-    crossings = signed_crossings(mesh, view.camera, batch=batch)
+    crossings = signed_crossings(mesh, view.camera)
     return airlight.radiance(crossing_sum(crossings, airlight, distance, lane=lane))
