@@ -175,15 +175,7 @@ def _integral(ray: BoundedRays, piece: Piece, x0, x1):
     if ray.form != "exact":
         return _panels(ray, piece, x0, x1, [])
     paths = paths_from(ray.medium, ray.light, ray.rays.origin, ray.rays.direction, own=piece.number, segment=(x0, x1))
-    others = [path.active for path in paths if not path.own]
-    if len(others) == len(paths) or not others:
-        return _panels(ray, piece, x0, x1, paths)
-    return dr.if_stmt(
-        args=(x0, x1),
-        cond=reduce(or_, others),
-        true_fn=lambda x0, x1: _panels(ray, piece, x0, x1, paths),
-        false_fn=lambda x0, x1: _panels(ray, piece, x0, x1, [path for path in paths if path.own]),
-    )
+    return _panels(ray, piece, x0, x1, paths)
 
 
 def _panels(ray: BoundedRays, piece: Piece, x0, x1, paths: list[LightPaths]):
