@@ -102,11 +102,8 @@ def _fitted(ref: Array, tst: Array) -> float:
         return math.nan
     sign = float(np.sign(np.median(tst[lit])))
     # A difference of logarithms: the ratio may be out of range.
-    return sign * _exp(float(np.median(np.log(ref[lit]) - np.log(np.abs(tst[lit])))))
-
-
-def _exp(value: float) -> float:
-    return math.exp(value) if value < _LARGEST else math.nan
+    power = float(np.median(np.log(ref[lit]) - np.log(np.abs(tst[lit]))))
+    return sign * math.exp(power) if power < _LARGEST else math.nan
 
 
 def _usual_error(ref: Array, tst: Array) -> float:

@@ -3,7 +3,7 @@
 
 Read in this order:
 
-- `unknowns.py`: the parameters by name, and the fog as a function of them;
+- `unknowns.py`: the parameters by name, as faults of a guess that set a number;
 - `solve.py`: Levenberg and Marquardt's method with the weights that the noise asks for, and intervals;
 - `confounding.py`: which parameters an image does not tell apart;
 - `fit.py`: an image file against a scene.

@@ -61,7 +61,7 @@ _USUAL = 0.05  # relative error that a start may well have
 _DIM = 0.01  # of the mean of the image: below it a value need not be right relative to itself
 _ROUNDS = 6
 _LEAST_KEPT = 0.5  # fraction of the pixels that must agree with one another
-_OUTLIER = 6.0  # standard deviations beyond which a value is left out
+_OUTLIER = 6.0  # standard deviations beyond which a value is left out with its pixel
 _GROUPS = 24
 _ROUNDING = 2e-7  # of the radiance: values are float32
 _LINEAR = 1e-3  # of a number on the whole line: in so short a step the image is linear in it
@@ -97,14 +97,14 @@ class Model:
         """The values of the image, (m, 3)."""
         return self.predictor.shown(self.guess)
 
-    def with_places(self, place: Array) -> Guess:
+    def guess_at(self, place: Array) -> Guess:
         """Return the guess for places of the parameters."""
         values, at = (outward(self.numbers, each) for each in (place, self.at))
         return guess_of(self.predictor, self.unknowns, values, at=at, guess=self.guess)
 
     def values(self, place: Array) -> Array:
         """Return the radiance of the pixels, (m, 3) [W/(m^2 sr)]."""
-        return self.predictor.predicted(self.with_places(place))
+        return self.predictor.predicted(self.guess_at(place))
 
     def slopes(self, place: Array) -> Array:
         """Return the derivatives of `values` by each place, (m, 3, unknowns)."""
@@ -117,7 +117,7 @@ class Model:
             replace(self, unknowns=tuple(compress(self.unknowns, chosen)), at=self.at[chosen])
             for chosen in (free, ~free)
         )
-        return replace(free_ones, guess=held_ones.with_places(place[~free]))
+        return replace(free_ones, guess=held_ones.guess_at(place[~free]))
 
     @property
     def relative(self) -> Array:
@@ -223,7 +223,7 @@ def weighted_fit(model: Model, start: Array) -> Solution:
         radiance = model.values(inner)
         residual = model.image - radiance
         sigma = noise_of(radiance.ravel(), residual.ravel()).reshape(radiance.shape)
-        before, kept = kept, ~outliers(residual, sigma)
+        before, kept = kept, np.all(np.abs(residual) <= _OUTLIER * sigma, axis=1)
         weights = 1 / sigma
         if kept.mean() < _LEAST_KEPT:
             # Nothing explains most of the image: what is left is no noise. All pixels count, relative to themselves.
@@ -285,11 +285,6 @@ def noise_of(radiance: Array, residual: Array) -> Array:
     rows = np.stack([np.ones_like(squares), squares / scale], axis=1) / scatter[:, None] ** 2
     (constant, relative), _ = nnls(rows, np.ones(len(rows)))
     return np.sqrt(constant + relative * radiance**2 / scale + least**2)
-
-
-def outliers(residual: Array, sigma: Array) -> Bools:
-    """Return which pixels have a value that is off by more than six sigma; both (pixels, 3) -> (pixels,)."""
-    return np.asarray(np.any(np.abs(residual) > _OUTLIER * sigma, axis=1))
 
 
 def interval_ends(model: Model, solution: Solution) -> Array:

@@ -111,8 +111,7 @@ def point_nodes(
     if isinstance(reference.medium, HeightMedium):
         piece, start, width = equal_panels(np.arange(len(ray)), start, width, np.maximum(np.ceil(width / _PANEL), 1))
         low, high = (foot[piece] + height[piece] * np.sinh(w) for w in (start, start + width))
-        low, high = _heights(reference, ray[piece], low), _heights(reference, ray[piece], high)
-        span = _scale_heights(reference.medium, low, high) / _SCALE_HEIGHTS
+        span = _scale_heights(reference.medium, *_heights(reference, ray[piece], low, high)) / _SCALE_HEIGHTS
         number, start, width = equal_panels(np.arange(len(piece)), start, width, np.clip(np.ceil(span), 1, _MOST))
         piece = piece[number]
         ray, foot, height, medium = ray[piece], foot[piece], height[piece], medium[piece]
@@ -249,11 +248,12 @@ def _unbounded(reference: ReferenceScene, stretches: Stretches, place: Array) ->
     return cut(pieces, kinks) if len(ray) and len(kinks[0]) else pieces
 
 
-def _heights(reference: ReferenceScene, ray: Index, x: Array) -> Array:
+def _heights(reference: ReferenceScene, ray: Index, *distances: Array) -> list[Array]:
     """Return the heights at distances along rays [m]."""
     assert isinstance(reference.medium, HeightMedium)
     up = reference.medium.up
-    return np.asarray(reference.origin @ up + x * (reference.direction[ray] @ up))
+    start, rise = reference.origin @ up, reference.direction[ray] @ up
+    return [start + x * rise for x in distances]
 
 
 def _scale_heights(medium: HeightMedium, low: Array, high: Array) -> Array:
@@ -273,9 +273,9 @@ def _before_sun(reference: ReferenceScene, light: DirectionalLight, stretches: S
         first = pieces.first
         middle = 0.5 * (pieces.x0 + pieces.x1)[first]
         pieces = cut(pieces, (pieces.ray[first], middle))
-    middle = _heights(reference, pieces.ray, 0.5 * (pieces.x0 + pieces.x1))
+    (middle,) = _heights(reference, pieces.ray, 0.5 * (pieces.x0 + pieces.x1))
     pieces = pieces[np.isfinite(fog.log_density(middle))]
-    low, high = (_heights(reference, pieces.ray, x) for x in (pieces.x0, pieces.x1))
+    low, high = _heights(reference, pieces.ray, pieces.x0, pieces.x1)
     steep = 1 + np.abs(reference.direction[pieces.ray] @ medium.up) / mu
     depth = steep * fog.optical_depth(low, high, pieces.x1 - pieces.x0)
     return pieces, np.minimum(np.maximum(depth, 2 * _scale_heights(medium, low, high)), _MOST * _DEEP)
