@@ -148,4 +148,4 @@ def test_a_run_that_is_killed_loses_nothing(variant, tmp_path, capfd, own_cache)
     assert all(load_arrays(name) is not None for name in names)
     resumed = summary(tmp_path / "b.exr", capfd, "--samples", "2048")
     assert resumed["how"]["cached"] >= 3
-    assert resumed["damaged"] == 0
+    assert resumed["how"]["damaged"] == 0
