@@ -123,4 +123,4 @@ def test_a_reference_from_a_cluster_has_the_same_bytes(tmp_path, words):
         files.append(file.read_bytes())
     assert files[0] == files[1]
     if words[1] == "single-scatter":
-        assert json.loads(ran.stdout)["cached"] == 0
+        assert json.loads(ran.stdout)["how"]["cached"] == 0
