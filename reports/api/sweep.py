@@ -5,7 +5,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ from reports.tables.record import Result, Said
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Place
+    from reports.cluster.run import Group
     from validation.study.keys import Made
     from validation.study.rows import RowStore
     from validation.study.study import Study
@@ -163,28 +163,23 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, pro
     def with_times(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
         return store.row(key) | (outcome.value if outcome.status == "done" else {})
 
-    def part(place: "Place", groups: Callable[..., Any], row_from: Callable[..., Any], *, quick: bool = False) -> Any:
-        groups = partial(groups, study, made, store=store, scenes=scenes)
-        return _part(
-            study, store, place, groups, row_from, made=made, problems=problems, progress=progress, quick=quick
-        )
-
+    how: dict[str, Any] = {"made": made, "problems": problems, "progress": progress}
     # Images that nobody times are rendered once: their kernels compile longer than they run.
     quick = study.measure.times not in ("with", "stages")
-    missing, counts = part(place, cell_groups, with_errors, quick=quick)
-    untimed, timed = 0, Counter[str]()
-    if study.measure.times == "alone":
-        untimed, timed = part(1 if isinstance(place, int) else place, timing_groups, with_times)
-    total, computed = study.scene_count * study.cells_by_scene, counts.total() - counts["lost"]
+    groups = list(cell_groups(study, made, store=store, scenes=scenes))
+    counts = _part(study, store, place, groups, with_errors, quick=quick, **how)
+    groups = list(timing_groups(study, made, store=store, scenes=scenes))  # of rows that are there by now
+    timed = _part(study, store, 1 if isinstance(place, int) else place, groups, with_times, quick=False, **how)
+    total = study.scene_count * study.cells_by_scene
     return SweepRun(
         study=study.name,
         scenes=study.scene_count,
         cells=total,
-        cached=total - missing,
-        computed=computed,
+        cached=total - counts.total(),
+        computed=counts.total() - counts["lost"],
         timed_alone=timed["done"],
         counts=dict(counts),
-        left=missing - computed + untimed - (timed.total() - timed["lost"]),
+        left=counts["lost"] + timed["lost"],
         problems=tuple(problems),
         output=str(store.folder),
         parquet=None,
@@ -195,27 +190,25 @@ def _part(
     study: "Study",
     store: "RowStore",
     place: "Place",
-    groups_of: Callable[..., Any],
+    groups: "list[Group]",
     row_from: Callable[..., dict[str, Any]],
     *,
     made: "Made",
     problems: list[Problem],
     progress: Any,
     quick: bool,
-) -> tuple[int, Counter[str]]:
-    """Run groups, and add a row for each outcome; return how many cells were missing, and what came of them."""
+) -> Counter[str]:
+    """Run groups, and add a row for each outcome; return what came of their cells."""
     from reports.cluster.connect import connected
     from reports.cluster.run import run_groups
 
-    waiting = list(groups_of())
-    cells = {key: cell for _, several in waiting for key, cell in several.items()}
     counts, written = Counter[str](), time.monotonic()
-    if not cells:
-        return 0, counts
+    if not groups:
+        return counts
+    total = sum(len(group.tasks) for group in groups)
     with connected(place, quick=quick) as cluster, telling(progress, f"sweep {study.name}") as tell:
-        groups = [group for group, _ in waiting]
         for outcome in run_groups(cluster, groups, made=made, retries=study.retries):
-            key, cell = outcome.task.name, cells[outcome.task.name]
+            key, cell = outcome.task.name, outcome.task.arguments[0]
             if outcome.status != "lost":
                 store.add(row_from(cell, key, outcome))
             counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
@@ -224,5 +217,5 @@ def _part(
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()
                 written = time.monotonic()
-            tell(counts.total() / len(cells), f"{counts.total()} of {len(cells)} cells, {cell.scene}")
-    return len(cells), counts
+            tell(counts.total() / total, f"{counts.total()} of {total} cells, {cell.scene}")
+    return counts

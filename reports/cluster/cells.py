@@ -63,22 +63,19 @@ def times_of(cell: Cell) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name.startswith(("times.", "cost."))}
 
 
-Groups = Iterator[tuple[Group, dict[str, Cell]]]  #: and the cells by the names of their tasks, which are their keys
+def timing_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Iterator[Group]:
+    """Yield the tasks of the rows of a study that are timed alone, were done and have no times.
 
-
-def timing_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Groups:
-    """Yield the tasks of the rows of a study that are timed alone, were done and have no times."""
+    A task is named by the key of its row and begins its arguments with the cell, here and in `cell_groups`.
+    """
     for keyed in _keyed(study.timed_images(), made, scenes):
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
         missing = {key: cell for key, cell in wanted.items() if store.row(key)[FRAME_MS] is None}
         if missing:
-            yield (
-                Group(tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items())),
-                missing,
-            )
+            yield Group(tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items()))
 
 
-def cell_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Groups:
+def cell_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Iterator[Group]:
     """Yield the tasks of every image that lacks rows, or whose cells failed, hung or aborted."""
     for keyed in _keyed(study.images(), made, scenes):
         missing = {key: cell for key, cell in keyed.items() if store.status(key) not in _DONE}
@@ -86,7 +83,7 @@ def cell_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, 
             image = next(iter(missing.values())).image
             words = " ".join((image.scene, *image.medium, f"{image.size[0]}x{image.size[1]}"))
             tasks = tuple(Task(key, row_of, (cell, key), study.limit) for key, cell in missing.items())
-            yield Group(tasks, Task(f"{NO_REFERENCE}{words}", reference_of, (image,), study.limit)), missing
+            yield Group(tasks, Task(f"{NO_REFERENCE}{words}", reference_of, (image,), study.limit))
 
 
 def _keyed(images: Iterable[Iterable[Cell]], made: Made, scenes: dict[str, str]) -> Iterator[dict[str, Cell]]:
