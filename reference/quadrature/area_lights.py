@@ -20,12 +20,10 @@ gets: eight independent scramblings each give a mean, and their spread the stand
 
 import itertools
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from itertools import islice
-from typing import Any, TypeVar
 
 import drjit as dr
 import numpy as np
@@ -212,9 +210,20 @@ def _scattered(beam: Beam, active: Index, points: RayPoints, shadow_scale: float
         )
         return rows, lit.random_checks, np.moveaxis(value, 1, 2), error.sum(axis=1)
 
-    for rows, found, value, error in done_ahead(summed, lit_pairs(), workers=dr.thread_count()):
+    def add(rows: slice, found: RandomChecks, value: Array, error: Array) -> None:
         radiance[rows], bound[rows] = value, error
         checks.append(found)
+
+    # NumPy, which sums, works on one processor and releases Python's lock meanwhile. Dr.Jit, which finds the intervals,
+    # has threads of its own.
+    with ThreadPoolExecutor(dr.thread_count()) as pool:
+        waiting: deque[Future] = deque()
+        for pairs in lit_pairs():
+            waiting.append(pool.submit(summed, pairs))
+            if len(waiting) > dr.thread_count():
+                add(*waiting.popleft().result())
+        for future in waiting:
+            add(*future.result())
     known = RandomChecks.of_all(checks)
     counts = known.checked, known.disagreements, known.refined, known.left, known.missed
     return {"radiance": radiance, "bound": bound, "checks": np.array(counts)}
@@ -362,29 +371,3 @@ def seen_samples(
     lit = lit_intervals(rays, (0 * length, length), known, of=of, checks=0)
     of_length = length[lit.ray]
     return sections.drawn(replace(lit, low=lit.low / of_length, high=lit.high / of_length), uniform)
-
-
-Task = TypeVar("Task")
-Result = TypeVar("Result")
-
-
-def done_ahead(work: Callable[[Task], Result], tasks: Iterable[Task], *, workers: int) -> Iterator[Result]:
-    """Yield the results of some work in the order of its tasks, while threads do those that follow.
-
-    NumPy works on one processor and releases Python's lock meanwhile. Code that calls Dr.Jit stays with the caller, as
-    Dr.Jit has its own threads.
-
-    `work`: a function of one task that calls NumPy alone; `tasks`: in order; they are made by the caller's thread;
-    `workers`: threads; as many results and one more are kept at once. Raises what the work raises, when its
-    result is due; the tasks behind it are not begun.
-    """
-    remaining = iter(tasks)
-    with ThreadPoolExecutor(max(1, workers)) as pool:
-        waiting: deque[Future[Any]] = deque(pool.submit(work, task) for task in islice(remaining, workers + 1))
-        try:
-            while waiting:
-                result = waiting.popleft().result()
-                waiting.extend(pool.submit(work, task) for task in islice(remaining, 1))
-                yield result
-        finally:  # also where the caller stops, or is stopped
-            pool.shutdown(wait=False, cancel_futures=True)
