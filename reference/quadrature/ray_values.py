@@ -66,14 +66,13 @@ class ReferenceImage:
 
 @dataclass(frozen=True)
 class RayValues:
-    """Radiance, distance and lit intervals of each ray of a scene."""
+    """Radiance and distance of each ray of a scene."""
 
     airlight: Array  #: in-scattered radiance, (rays, 3) [W/(m^2 sr)]
     bound: Array  #: of the error of the airlight, (rays, 3) [W/(m^2 sr)]
     surface: Array  #: radiance of the lit surface through the medium, (rays, 3) [W/(m^2 sr)]
     distance: Array  #: as it was cast, in float32, (rays,) [m]
     light_angle: Array  #: (rays,) [rad]
-    intervals: NDArray[np.int64]  #: how many lit intervals a ray has, those of all lights together, (rays,)
     transitions: int  #: edges between light and shadow
     random_checks: RandomChecks  #: of the lit intervals
     #: area lights or a sky, seen directly, (rays, 3), and for each replicate of their samples airlight and
@@ -92,7 +91,7 @@ def ray_values(
     plan: PointPlan | None = None,
     keep: Keep | None = None,
 ) -> RayValues:
-    """Compute airlight, lit surface, distances and lit intervals of every ray of `reference.direction`.
+    """Compute airlight, lit surface and distances of every ray of `reference.direction`.
 
     `reference`: the scene, with any rays; `checks`, `shadow_scale`, `progress`, `plan`, `keep`: see
     `reference.quadrature.image.quadrature_image`; `shapes`: what `reference.scene.shapes.read_shapes` returned for the
@@ -105,7 +104,7 @@ def ray_values(
     hits = replace(hits, distance=exact_distance(reference, hits.interaction, cast, shapes))
     count = len(reference.direction)
     airlight, bound, light_angle = np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, np.pi)
-    intervals, transitions, found = np.zeros(count, np.int64), 0, list[RandomChecks]()
+    transitions, found = 0, list[RandomChecks]()
     reached: list[NDArray[np.bool_]] = []
     how = {"checks": checks, "shapes": shapes}
     wide_parts = 2 * bool(reference.area) + (reference.sky is not None)
@@ -116,7 +115,6 @@ def ray_values(
         airlight += received.radiance
         bound += received.bound
         light_angle = np.minimum(light_angle, received.angle)
-        intervals += np.bincount(received.lit.ray, minlength=count)
         transitions += received.lit.transitions
         found.append(received.lit.random_checks)
         seen = received.reached
@@ -152,7 +150,7 @@ def ray_values(
         airlight, surface, bound = airlight + mean[:, :3], surface + mean[:, 3:], bound + sky.bound
         wide["replicates"] = wide.get("replicates", 0.0) + sky.replicates
     checked = RandomChecks.of_all(found)
-    return RayValues(airlight, bound, surface, cast, light_angle, intervals, transitions, checked, **wide)
+    return RayValues(airlight, bound, surface, cast, light_angle, transitions, checked, **wide)
 
 
 def _tell(progress: Progress | None, total: int, done: int, fraction: float) -> None:
