@@ -3,8 +3,7 @@
 
 Read in this order:
 
-- `batches.py`: means of batches and the spread between them;
-- `allocation.py`: where the samples of a path tracer go;
+- `batches.py`: means of batches, the spread between them, and where their samples go;
 - `single_scatter`: an integrator of our own for Mitsuba;
 - `volpath`: Mitsuba's volumetric path tracer;
 - `slab_walk`: photons in a slab, counted by order of scattering;

@@ -25,7 +25,7 @@ in these runs; all light with their own materials, less all without, is what met
 there: the sky behind the clouds is in every run and cancels.
 
 Each batch has its own seed and at most 256 samples a pixel on the average; what a pixel gets may differ, see
-`reference.monte_carlo.allocation`. Sums, means and standard errors are taken in float64.
+`reference.monte_carlo.batches`. Sums, means and standard errors are taken in float64.
 """
 
 import math

@@ -24,8 +24,7 @@ from typing import Any, cast
 import numpy as np
 
 from analytic.clock import stopwatch
-from reference.monte_carlo.allocation import allocated
-from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches
+from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, allocated
 from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import ReferenceScene, read_reference
@@ -60,7 +59,7 @@ def agreement(
 
     The `mi.Scene` may be small, since all pixels are pooled. The estimator, 'volpath' or 'single-scatter', agrees if
     the 95 % interval of the relative bias lies inside +- `margin`. At most `batches` are traced, of `samples` a
-    pixel each; volpath places its samples where its pilot spread most (`reference.monte_carlo.allocation`). After
+    pixel each; volpath places its samples where its pilot spread most (`reference.monte_carlo.batches`). After
     `seconds`, the pilot not counted, no further batch is traced; `spread` lets other processes trace some. `points` are
     those of area lights in the reference of volpath (`validation.estimates.quadrature.reference_image`), whose margins
     are wider; single-scatter is compared with as many as the error of a pixel needs. The result is by layer,

@@ -76,7 +76,7 @@ def monte_carlo_batches(
     The estimator is 'single-scatter', 'volpath' or 'cloud-paths'. There are 2 `batches` at least, of at most 256
     `samples` a pixel; the first has the seed `first_seed`, the others count up. For volpath alone there are
     `max_depth`, the most edges of a path (`reference.monte_carlo.volpath.volpath_batch`), and `counts`,
-    samples of each pixel in each batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.allocation`).
+    samples of each pixel in each batch, (layers, pixels), with the mean `samples` (`reference.monte_carlo.batches`).
     `orders` are names of disjoint sets of orders of scattering, '3-4', each with its own layer: for a scene of
     clouds, by 'volpath' or 'cloud-paths'.
 

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.monte_carlo.allocation import EQUAL, allocated
 from reference.monte_carlo.batches import (
+    EQUAL,
     LARGEST_SEED,
     LAYERS,
+    allocated,
     combined_moments,
     merged,
     parse_seed_ranges,
