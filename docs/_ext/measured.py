@@ -20,6 +20,7 @@ from reports.tables.table import Column, Name, Row, Table, number
 from validation.columns import record_of
 from validation.kernels.records import KernelCost
 from validation.statistics.records import Fraction, MultipleScattering
+from validation.study.row import Row as CellRow
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 _METHOD = ("frame", "light_moved", "relative_rmse", "relative_bias", "p99", "max")
@@ -35,7 +36,7 @@ class KeptScene:
     counts: Mapping[str, int]
     reference: records.Reference
     multiple: MultipleScattering
-    methods: tuple[records.MethodRow, ...]
+    methods: tuple[CellRow, ...]
 
 
 @cache
@@ -47,11 +48,10 @@ def data() -> dict[str, Any]:
 @cache
 def kept_scenes() -> tuple[KeptScene, ...]:
     """Return the kept numbers of every scene; other keys of a method and its errors have their usual values."""
-    usual = {"kind": "built-in", "layer": "airlight", "surface_error": None, "flip": None, "files": {}}
 
     def row(entry: Mapping[str, Any]) -> dict[str, Any]:
         error = entry["error"] and {"pixels": 0, "bias": None, "rmse": None} | entry["error"]
-        return {**entry, **usual, "error": error}
+        return {**entry, "error": error}
 
     scenes = ({**scene, "methods": [row(entry) for entry in scene["methods"]]} for scene in data()["scenes"])
     return tuple(record_of(scene, KeptScene) for scene in scenes)
@@ -92,8 +92,8 @@ def method(name: str) -> str:
             if entry.method != name:
                 continue
             label = _inside(entry.label)
-            if entry.refused or entry.error is None:
-                notes.append(f"- {scene.name}, {label}: {entry.refused or entry.note or 'not measured'}")
+            if entry.reason or entry.error is None:
+                notes.append(f"- {scene.name}, {label}: {entry.reason or entry.note or 'not measured'}")
             else:
                 row = method_row(entry)
                 rows.append(Row(row.values | {"scene": Name(scene.name), "label": label}))

@@ -22,7 +22,10 @@ DATA, README = DOCS / "data" / "report.json", DOCS.parent / "README.md"
 SHOWN = "colonnade"  #: in the README
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
-_METHOD = ("label", "method", "kernel", "parameters", "knows_shadows", "refused", "left_out", "note")
+_METHOD = (
+    *("scene", "label", "method", "kernel", "parameters", "width", "height", "knows_shadows"),
+    *("status", "reason", "note"),
+)
 _COST = ("kernel", "family", "size", "phase", "g", "device", "wall", "median", "p99", "max", "nonfinite", "refused")
 
 

@@ -16,14 +16,12 @@ from typing import Any, Literal, get_args, get_type_hints
 from analytic.errors import InputError
 from validation.columns import column, described, record_of
 from validation.kernels.records import Stability
-from validation.metrics.errors import Metrics, RunsError
-from validation.metrics.flip import Flip
 from validation.papers.claims import Claim as PaperClaim
 from validation.statistics.records import Agreement, MultipleScattering, Number
-from validation.study.row import Cost
-from validation.timing import FrameTimes, Scaling
+from validation.study.row import Row
+from validation.timing import Scaling
 
-SCHEMA = "airlight-report/2"
+SCHEMA = "airlight-report/3"
 
 Size = tuple[int, int]  #: width and height [pixels]
 Files = Mapping[str, str]  #: names relative to the folder of the report, by what they are
@@ -102,38 +100,10 @@ class Reference:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MethodRow:
-    """The cost and error of a method in a scene, or of an engine's image."""
+class Method(Row):
+    """The row of a method in a scene, or of an engine's image: its files, and when it was measured."""
 
-    label: str = column(meaning="its name in tables")
-    kind: Literal["built-in", "function", "image"] = column(meaning="`function` of a user, `image` of an engine")
-    layer: Literal["airlight", "surface", "total"] = column(meaning="that `error` compares")
-    pixel: Literal["centre", "area"] = column(meaning="of the reference that its pixels fit", default="centre")
-    method: str = column(meaning="of the configuration; `image` for an image")
-    kernel: str | None = column(meaning="of the configuration")
-    knows_shadows: bool = column(meaning="whether it renders volumetric shadows")
-    status: str = column(meaning="`done`, `refused` or `left out`", default="done")
-    note: str | None = column(meaning="how its times or its image differ from those of other methods")
-    device: str | None = column(meaning="that draws a shader and times it; `null` for Dr.Jit", default=None)
-    times: FrameTimes | None = column(meaning="of frames, see below; of an image those of its `times.json`")
-    memory: Number = column(unit="MiB", meaning="peak of a frame that prepares everything again", default=None)
-    cost: Cost | None = column(
-        meaning="`cost` of the [rows of a sweep](#rows-of-a-sweep); `null` for images", default=None
-    )
-    error: Metrics | None = column(meaning="against the reference")
-    noise: RunsError | None = column(meaning="of a method that draws random numbers: errors over runs", default=None)
-    surface_error: Metrics | None = column(meaning="the same for the lit surface; `null` if there is none")
-    flip: Flip | None = column("HDR-FLIP", meaning="of all light, or why there is none; `null` if not asked for")
-    parameters: Mapping[str, int | float | bool | str] = column(meaning="of the configuration")
-    refused: str | None = column(meaning="why there is no frame; `null` if there is one")
-    left_out: bool = column(meaning="whether the time was the only reason for `refused`")
     files: Files = column(meaning="`exr`, `picture`, `error` (a picture of the signed relative error)")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Method(MethodRow):
-    """A row of a report, and when it was measured."""
-
     measured: str = column(meaning="date of the measurement")
     seconds: float = column(unit="s", meaning="that it took")
     cached: bool = column(meaning="whether an earlier run made it")

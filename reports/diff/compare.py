@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from analytic.errors import InputError
-from reports.data.records import MethodRow, Report, Scene
+from reports.data.records import Report, Scene
 from reports.diff.times import Finding, TimeComparison, compare_times
 from reports.report.claims import confirmed
 from reports.tables.agreement import verdict
@@ -20,6 +20,7 @@ from reports.tables.table import Table, fields_of, table, words
 from validation.metrics.errors import Metrics
 from validation.papers.claims import Claim
 from validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
+from validation.study.row import Row
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 #: Units of figures that depend on how busy the machine was: another verdict is a note.
@@ -101,13 +102,13 @@ def _methods(old: Scene, new: Scene) -> tuple[list[Finding], int]:
     return findings, compared
 
 
-def _entries(old: MethodRow, new: MethodRow, *, errors: bool) -> tuple[list[Change], int]:
+def _entries(old: Row, new: Row, *, errors: bool) -> tuple[list[Change], int]:
     """Compare a configuration in a scene, and where `errors` can be compared these: return how many were."""
-    if bool(old.refused) != bool(new.refused):
-        words = f"refused: {new.refused}" if new.refused else "no longer refused"
+    if bool(old.reason) != bool(new.reason):
+        words = f"refused: {new.reason}" if new.reason else "no longer refused"
         # Leaving a method out for the time it takes is a decision of the user, not a fault.
-        decided = old.left_out or new.left_out
-        return [("note" if decided else "worse" if new.refused else "better", words, None, None)], 0
+        decided = "left out" in (old.status, new.status)
+        return [("note" if decided else "worse" if new.reason else "better", words, None, None)], 0
     if old.layer != new.layer:
         return [("note", "errors not compared: they are of different layers", None, None)], 0
     if not errors:
@@ -146,7 +147,7 @@ def _numbers(errors: Metrics | None) -> Numbers:
     return asdict(errors) if errors else {}
 
 
-def _errors_of(entry: MethodRow, noisy: bool) -> Numbers:
+def _errors_of(entry: Row, noisy: bool) -> Numbers:
     """Return the errors of an image, or those of noisy runs, without quantiles of a single one."""
     error = _numbers(entry.error)
     if not noisy or entry.noise is None:
@@ -175,7 +176,7 @@ def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], i
     return changes, len(_ERRORS)
 
 
-def _flip(old: MethodRow, new: MethodRow) -> tuple[list[Change], int]:
+def _flip(old: Row, new: Row) -> tuple[list[Change], int]:
     before, after = (entry.flip.value if entry.flip else None for entry in (old, new))
     if before is None or after is None:
         return [], 0

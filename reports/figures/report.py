@@ -16,13 +16,14 @@ from analytic.errors import InputError, nearest
 from reference.storage.exr import layer as image_layer
 from reference.storage.exr import read_exr
 from reference.storage.files import write_text
-from reports.data.records import MethodRow, Report, Scene, load_report
+from reports.data.records import Method, Report, Scene, load_report
 from reports.plotting.figure import ENDINGS, has_point, new_figure, save_figure, show_picture, speed_chart
 from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
 from reports.plotting.style import COLOURS, WIDTHS
 from reports.tables.drawing import latex
 from reports.tables.methods import method_row, methods_table
 from reports.tables.table import Row, number
+from validation.study.row import Row as CellRow
 
 _TIMES = ("frame", "light_moved", "objects_moved")
 _ERRORS = ("relative_rmse", "relative_bias", "p99")
@@ -65,8 +66,8 @@ def latex_table(scenes: Sequence[Scene]) -> str:
     return latex(tables, comment=comment)
 
 
-def _latex_row(entry: MethodRow) -> Row:
-    if entry.refused:
+def _latex_row(entry: CellRow) -> Row:
+    if entry.reason:
         return Row({"label": entry.label}, "refused")
     keys = ("label", *_TIMES, *_ERRORS)
     values = {key: value for key, value in method_row(entry).values.items() if key in keys}
@@ -104,11 +105,11 @@ def _scene(report: Report, name: str | None) -> Scene:
     return scenes[name] if name else (shadowed or list(scenes.values()))[0]
 
 
-def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[MethodRow]:
+def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[Method]:
     """Return the methods to show: those that were asked for, or the most accurate of each."""
     known = {entry.label: entry for layer in ("airlight", "total") for entry in _shown(scene, layer)}
     if wanted is None:
-        best: dict[str, MethodRow] = {}
+        best: dict[str, Method] = {}
         for entry in _shown(scene, "airlight") or _shown(scene, "total"):
             if entry.method not in best or _rank(entry) < _rank(best[entry.method]):
                 best[entry.method] = entry
@@ -124,17 +125,17 @@ def _chosen(scene: Scene, wanted: Sequence[str] | None) -> list[MethodRow]:
     return chosen
 
 
-def _shown(scene: Scene, layer: str) -> list[MethodRow]:
+def _shown(scene: Scene, layer: str) -> list[Method]:
     """Return the methods of a scene that have an image whose error is of a layer."""
     return [entry for entry in scene.methods if "exr" in entry.files and entry.error and entry.layer == layer]
 
 
-def _rank(entry: MethodRow) -> float:
+def _rank(entry: CellRow) -> float:
     rmse = _rmse(entry)
     return math.inf if math.isnan(rmse) or (entry.error and entry.error.nonfinite) else rmse
 
 
-def _rmse(entry: MethodRow) -> float:
+def _rmse(entry: CellRow) -> float:
     rmse = None if entry.error is None else entry.error.relative_rmse
     return math.nan if rmse is None else rmse
 
@@ -163,7 +164,7 @@ def worst_squares(images: Sequence[Any], side: int) -> tuple[tuple[int, int], ..
     return tuple(corners)
 
 
-def draw_strip(scene: str, methods: Sequence[MethodRow], images: Sequence[Any], column: str) -> Any:
+def draw_strip(scene: str, methods: Sequence[CellRow], images: Sequence[Any], column: str) -> Any:
     """Return reference and methods in one exposure, two insets of each, and the signed relative error."""
     height, width = images[0].shape[:2]
     side = max(4, min(height, width) // _INSET)
@@ -188,7 +189,7 @@ def draw_strip(scene: str, methods: Sequence[MethodRow], images: Sequence[Any], 
     return figure
 
 
-def _words(entry: MethodRow | None, scene: str) -> str:
+def _words(entry: CellRow | None, scene: str) -> str:
     """Return a label, broken before its parameters, with the error and the time."""
     if entry is None:
         return f"reference\n\n{scene}"

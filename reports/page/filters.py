@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from reports.data.records import MethodRow, Report, Scene
+from reports.data.records import Report, Scene
 from reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
 from reports.tables.costs import scaling_tables, stability_summary
 from reports.tables.drawing import DASH, html, sentence_in_html, typeset
@@ -14,6 +14,7 @@ from reports.tables.methods import fastest_table, method_row, methods_table, pub
 from reports.tables.papers import paper_tables
 from reports.tables.table import Column, Row, Table, table
 from reports.tables.table import number as plain_number
+from validation.study.row import Row as CellRow
 
 #: Kinds of claims as the page names them.
 KINDS = {
@@ -111,7 +112,7 @@ def methods(scene: Scene) -> Table:
     """Return the times and errors of the methods of a scene."""
     shadows = scene.plan["shadows"].startswith("vis")
 
-    def row(entry: MethodRow) -> Row:
+    def row(entry: CellRow) -> Row:
         made, peer = method_row(entry, shadows=shadows), published_as(entry)
         return replace(made, remarks=(*made.remarks, f"published peer, {peer}")) if peer else made
 

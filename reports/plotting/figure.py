@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reference.storage.files import write_bytes
-from reports.data.records import MethodRow, Scene
+from reports.data.records import Scene
 from reports.plotting.style import WIDTHS, figure_style, report_styles
+from validation.study.row import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,7 +68,7 @@ def show_picture(panel: "Axes", picture: Any, title: str = "", size: float = 6) 
     panel.set_title(title, fontsize=size, parse_math=False)  # a dollar in a name must not begin a formula
 
 
-def has_point(entry: MethodRow) -> bool:
+def has_point(entry: Row) -> bool:
     """Return whether a method has a time and an error; an error of 0 has no place on a logarithmic axis."""
     return bool(entry.times and entry.error and entry.error.relative_rmse)
 
@@ -102,7 +103,7 @@ def legend_below(figure: "Figure", panel: "Axes", styles: Mapping[str, Mapping[s
 
 
 def speed_panel(
-    panel: "Axes", title: str, entries: Iterable[MethodRow], styles: Mapping[str, Mapping[str, Any]]
+    panel: "Axes", title: str, entries: Iterable[Row], styles: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label.
 

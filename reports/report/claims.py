@@ -16,11 +16,12 @@ The kinds of claims:
 from collections.abc import Iterable, Iterator, Sequence
 
 from realtime.methods.shader.source import is_users
-from reports.data.records import Claim, MethodRow, Scene
+from reports.data.records import Claim, Scene
 from reports.tables.agreement import margin_words, verdict, worst_interval
 from reports.tables.costs import WORK, cliffs
 from reports.tables.methods import published_as
 from validation.statistics.records import Agreement
+from validation.study.row import Row
 from validation.timing import Scaling
 
 Scenes = Sequence[Scene]
@@ -35,7 +36,8 @@ def claims(scenes: Scenes) -> list[Claim]:
     sentences = [*_trust(scenes), _left_out(scenes), *_images(scenes), *_failed(scenes)]
     slow = "Not measured for the time that they take"
     for kind, words, left_out in (("refused", "Refused", False), ("not-measured", slow, True)):
-        named = [f"{m.label} in {name}" for name, m in _entries(scenes) if m.refused and m.left_out == left_out]
+        without = [(name, m) for name, m in _entries(scenes) if m.reason and (m.status == "left out") == left_out]
+        named = [f"{m.label} in {name}" for name, m in without]
         if named:
             sentences.append(_claim(kind, f"{words}, with the reason in the tables: {'; '.join(named)}."))
     return sentences + _without_flip(scenes)
@@ -79,7 +81,7 @@ def _claim(kind: str, text: str, good: bool | None = None) -> Claim:
     return Claim(kind=kind, text=text, good=good)
 
 
-def _entries(scenes: Scenes) -> list[tuple[str, MethodRow]]:
+def _entries(scenes: Scenes) -> list[tuple[str, Row]]:
     """Return the scene's name with every entry: those of methods, then the images of engines."""
     entries = [(scene.name, entry) for scene in scenes for entry in scene.methods]
     return sorted(entries, key=lambda pair: pair[1].kind == "image")
@@ -161,7 +163,7 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
         yield _claim("failed", text + " They are counted in the bound of the reference.", False)
 
 
-def _pixels(scene: str, m: MethodRow, count: str) -> str:
+def _pixels(scene: str, m: Row, count: str) -> str:
     pixels = getattr(m.error, count)
     return f"{m.label} in {scene} ({pixels} pixel{'' if pixels == 1 else 's'})"
 
@@ -185,7 +187,7 @@ def own_fault(method: str, refused: str | None) -> str | None:
     return refused if is_users(method) and refused and refused.startswith(f"method {method}: ") else None
 
 
-def own_faults(methods: Iterable[MethodRow]) -> list[str]:
+def own_faults(methods: Iterable[Row]) -> list[str]:
     """Return the faults of user methods, each once."""
-    faults = (own_fault(row.method, row.refused) for row in methods if row.kind == "function")
+    faults = (own_fault(row.method, row.reason) for row in methods if row.kind == "function")
     return list(dict.fromkeys(filter(None, faults)))

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The record of one scene of a report, and its files: an EXR and pictures of the reference and of every row."""
 
-import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +11,13 @@ import numpy as np
 from realtime.scene.read_scene import describe
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import Image, write_exr
-from reports.data.records import Method, MethodRow, Reference, Scene, SceneFiles
+from reports.data.records import Method, Reference, Scene, SceneFiles
 from reports.machine.environment import stamped
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from validation.columns import record_of
 from validation.estimates.images import layered_reference
 from validation.scenes.loading import scene_stem
 from validation.study.reference import of_image
-from validation.study.row import Row
 from validation.study.scene import Judged, SceneResult
 
 #: Files of a report by what they are.
@@ -59,24 +56,18 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
 
 def _entry(judged: Judged, report: Path, stem: str, factor: float) -> Method:
     """Return the record of a row, with its files written."""
-    row, named = judged.row, dict[str, str]()
+    named = dict[str, str]()
     if judged.image is not None and judged.expected is not None:
-        test = np.asarray(judged.image.layers[row.layer], dtype=np.float64)
+        test = np.asarray(judged.image.layers[judged.row.layer], dtype=np.float64)
         pictures = {"picture": tone_mapped(judged.light, factor), "error": error_map(judged.expected, test)}
         named = _written(report, stem, judged.image, pictures)
     return Method(
-        **vars(row_record(row, named)),
+        **vars(judged.row),
+        files=named,
         measured=judged.results[0].measured,
         seconds=round(sum(result.seconds for result in judged.results), 3),
         cached=all(result.loaded for result in judged.results),
     )
-
-
-def row_record(row: Row, files: Mapping[str, str]) -> MethodRow:
-    """Return the record of a row in a report, with the names of its files."""
-    own = {name: getattr(row, name) for name in (each.name for each in fields(MethodRow)) if hasattr(row, name)}
-    own |= {"parameters": json.loads(row.parameters), "refused": row.reason, "left_out": row.status == "left out"}
-    return MethodRow(**own, files=files)
 
 
 def reference_record(reference: ReferenceImage) -> Reference:

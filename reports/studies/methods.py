@@ -2,7 +2,7 @@
 """Studies of methods: times and errors, and errors by cause."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -153,7 +153,6 @@ def methods(
     """
     from reports.api.render import asked_configurations
     from reports.report.claims import own_faults
-    from reports.report.scene import row_record
     from reports.tables.methods import methods_table
     from validation.study.scene import configurations_for
     from validation.study.study import Measure
@@ -161,21 +160,19 @@ def methods(
     chosen, apart = asked_configurations(method, kernel, settings)
     loaded = loaded_scenes(scenes, size)
     check_study("methods", loaded, chosen, progress=progress)
-    benched, tables, wrong, rows = [], [], [], []
+    tables, wrong, rows = [], [], []
     for scene, tell in scene_by_scene(loaded, "methods", progress):
         read, _, cell = cells_of(scene, Measure("stages", seconds, every_metric=False), apart=apart)
-        useful, records = configurations_for(read.features, chosen), []
+        useful, found = configurations_for(read.features, chosen), []
         for at, each in enumerate(useful):
             tell(at / len(useful), each.label)
-            row = cell(each)[0]
-            records.append(row_record(row, {}))
-            rows.append(replace(row, scene=scene.name))
-        benched.append({"name": scene.name, "size": [*scene.size], "methods": [asdict(each) for each in records]})
-        tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), records))
-        wrong += own_faults(records)
+            found.append(replace(cell(each)[0], scene=scene.name))
+        rows += found
+        tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), found))
+        wrong += own_faults(found)
     return MethodsStudy(
         name="methods",
-        data=with_environment(scenes=benched),
+        data=with_environment(rows=rows),
         tables=tuple(tables),
         rows=tuple(rows),
         faults=tuple(dict.fromkeys(wrong)),

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Costs and errors of methods: a table of studies, the page, the documentation and papers."""
 
+import json
 from collections.abc import Iterable
 from dataclasses import fields
-from typing import TypeVar
 
 from realtime.methods.shader.source import is_shader
-from reports.data.records import MethodRow, Scene
+from reports.data.records import Scene
 from reports.tables.table import (
     Column,
     Name,
@@ -34,18 +34,16 @@ COLUMNS = {
     for column in (
         *words(label="method"),
         *fields_of(FrameTimes, "frame", spread="quartiles"),
-        *fields_of(MethodRow, "device"),
+        *fields_of(CellRow, "device"),
         *numbers(frame_rate="frames/s", how={"whole": True}),
         *numbers(airlight_rate="airlight/s", how={"whole": True, "minor": True}),
         *fields_of(FrameTimes, *TIMES[1:], minor=True),
-        *fields_of(MethodRow, "memory", whole=True, minor=True),
+        *fields_of(CellRow, "memory", whole=True, minor=True),
         *fields_of(Metrics, *ERRORS[:-1], digits=2, fraction=True),
-        *fields_of(MethodRow, "flip"),
+        *fields_of(CellRow, "flip"),
         *fields_of(Metrics, "nonfinite", alarm=True),
     )
 }
-_Entry = TypeVar("_Entry", MethodRow, CellRow)
-
 TARGETS = (0.01, 0.001)  #: relative RMSE for which the fastest method is named
 #: Columns of what `bench` prints.
 BENCH = (
@@ -54,7 +52,7 @@ BENCH = (
 )
 
 
-def methods_table(title: str, methods: Iterable[MethodRow | Row], *keys: str, explanation: str = "") -> Table:
+def methods_table(title: str, methods: Iterable[CellRow | Row], *keys: str, explanation: str = "") -> Table:
     """Return the table of the `methods` of a scene of report.json, or of rows that have some of `COLUMNS`.
 
     `keys` are those of `COLUMNS`; `BENCH` by default. Where a shader was timed, its device stands beside its time.
@@ -66,7 +64,7 @@ def methods_table(title: str, methods: Iterable[MethodRow | Row], *keys: str, ex
     return Table(title, tuple(COLUMNS.values()), rows, explanation).only(*shown)
 
 
-def method_row(entry: MethodRow, *, shadows: bool = False) -> Row:
+def method_row(entry: CellRow, *, shadows: bool = False) -> Row:
     """Return the costs and errors of a method as a row; `shadows` marks a method that knows none."""
     users = "user's shader" if is_shader(entry.method) else "user's function"
     remarks = [f"image, {entry.layer}"] if entry.kind == "image" else [users] if entry.kind == "function" else []
@@ -74,9 +72,8 @@ def method_row(entry: MethodRow, *, shadows: bool = False) -> Row:
         remarks.append("no shadows")
     remarks += [entry.note] if entry.note else []
     values: dict[str, Value] = {"label": entry.label}
-    if entry.refused:
-        why = "left out" if entry.left_out else "refused"
-        return Row(values, f"{why}: {entry.refused}", tuple(remarks))
+    if entry.reason:
+        return Row(values, f"{entry.status}: {entry.reason}", tuple(remarks))
     values |= {name: measured(getattr(entry.times, name, None)) for name in TIMES}
     values |= {f"{name}_rate": per_second(getattr(entry.times, name, None)) for name in ("frame", "airlight")}
     values |= {name: getattr(entry.error, name, None) for name in ERRORS}
@@ -94,14 +91,14 @@ def rate_words(milliseconds: float) -> str:
     return f"{digits_of(1000 / milliseconds, COLUMNS['frame_rate'])} frames/s"
 
 
-def fastest_within(error: float, entries: Iterable[_Entry]) -> tuple[_Entry, float] | None:
+def fastest_within(error: float, entries: Iterable[CellRow]) -> tuple[CellRow, float] | None:
     """Return the row of the fastest frame [ms] among those with at most a relative RMSE; None where there is none.
 
     Shaders run on another device, and are in no race with others. Pixels that are not finite are left out of the RMSE:
     a method that has any must not win by it.
     """
 
-    def reaches(entry: _Entry) -> bool:
+    def reaches(entry: CellRow) -> bool:
         if entry.device or entry.error is None or entry.error.relative_rmse is None:
             return False
         return entry.error.relative_rmse <= error and not entry.error.nonfinite
@@ -124,7 +121,7 @@ def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
     return table("The fastest method within an error", (*words("scene"), *columns), rows, explanation=explanation)
 
 
-def _name_and_time(found: tuple[MethodRow, float] | None) -> str:
+def _name_and_time(found: tuple[CellRow, float] | None) -> str:
     if found is None:
         return "none"
     entry, milliseconds = found
@@ -145,7 +142,7 @@ _VALUES = {
 }
 
 
-def published_as(entry: MethodRow) -> str:
+def published_as(entry: CellRow) -> str:
     """Return which paper a method of report.json reproduces with its errors, and what is wrong; else nothing."""
-    values = (_VALUES.get((name, str(value)), "") for name, value in entry.parameters.items())
+    values = (_VALUES.get((name, str(value)), "") for name, value in json.loads(entry.parameters).items())
     return next(filter(None, values), "") or _KERNELS.get(entry.kernel or "", "")

@@ -75,16 +75,16 @@ def entry(label: str, relative_rmse: float | None = 0.01, median: float = 2.0, *
     """Return what a report says of a configuration, which takes so many milliseconds a frame."""
     name, _, inside = label.partition(" (")
     kernel = inside.rstrip(")").split(", ")[0]
-    made = {"label": label, "kind": "built-in", "layer": "airlight", "method": name, "parameters": {}, "files": {}}
-    made |= {"kernel": kernel if kernel and "=" not in kernel else None, "knows_shadows": True, "left_out": False}
+    made = {"scene": "fog", "label": label, "method": name, "parameters": "{}", "width": 320, "height": 240}
+    made |= {"kernel": kernel if kernel and "=" not in kernel else None, "status": "done", "files": {}}
     made |= {"times": {stage: timing(fraction * median) for stage, fraction in _STAGES.items()}}
     made |= {"error": errors(relative_rmse), "measured": WHEN, "seconds": 1.5, "cached": False}
-    return made | dict.fromkeys(("refused", "note", "surface_error", "flip")) | changes
+    return made | dict.fromkeys(("reason", "note", "surface_error", "flip")) | changes
 
 
 def refused(label: str, why: str, **changes: Any) -> dict[str, Any]:
     """Return what a report says of a configuration that was refused."""
-    return entry(label, refused=why, times=None, error=None) | changes
+    return entry(label, status="refused", reason=why, times=None, error=None) | changes
 
 
 def engine(label: str, relative_rmse: float = 0.1, **changes: Any) -> dict[str, Any]:
@@ -157,7 +157,7 @@ def stable(kernel: str, *broken: str) -> dict[str, Any]:
 
 def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
     """Return the content of a report."""
-    made = {"schema": "airlight-report/2", "created": "2026-11-21 12:00:01 +0000", "command": "airlight report"}
+    made = {"schema": "airlight-report/3", "created": "2026-11-21 12:00:01 +0000", "command": "airlight report"}
     made |= {"seconds": 2.0, "parts": {"scenes": 2.0}, "cached": 0, "computed": 4}
     made |= {"measured": {"first": WHEN, "last": WHEN}, "settings": settings(), "environment": environment()}
     made |= {"claims": [{"kind": "reference", "text": "The reference is confirmed by volpath.", "good": True}]}

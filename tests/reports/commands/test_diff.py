@@ -49,7 +49,7 @@ def test_the_status_and_the_json_say_what_is_worse(files, capsys):
     assert data["worse"] == 5
     assert run(["diff", paths[1], paths[0]]) == 0
     assert "5 better" in capsys.readouterr().out
-    method(new, "fog").update(refused="expected a mesh [obj] in [0, 1]", times=None, error=None)
+    method(new, "fog").update(status="refused", reason="expected a mesh [obj] in [0, 1]", times=None, error=None)
     assert run(["diff", *files(report(), new)]) == 1
     assert "expected a mesh [obj] in [0, 1]" in capsys.readouterr().out  # brackets are words
 
@@ -126,7 +126,9 @@ def test_another_machine_is_compared_beside_the_median_of_all():
 
 
 def _refused(new):
-    method(new).update(refused="too many planes", times=None, error=None, surface_error=None, flip=None)
+    method(new).update(
+        status="refused", reason="too many planes", times=None, error=None, surface_error=None, flip=None
+    )
 
 
 #: A change of a report, and what of it is worse; None where something must be and the words do not matter.
@@ -140,7 +142,7 @@ CHANGES = [
     (lambda new: method(new)["error"].update(negative=90), None),
     (lambda new: new["scenes"][0]["methods"].pop(1), ["fog ray-march (steps=100) gone"]),
     (_refused, ["hall shadow-planes (exact) refused: too many planes"]),
-    (lambda new: (_refused(new), method(new).update(left_out=True)), []),  # a decision of who measured
+    (lambda new: (_refused(new), method(new).update(status="left out")), []),  # a decision of who measured
     (lambda new: new["scenes"][0]["agreement"].update({"volpath airlight": agreement(False)}), None),
     (lambda new: new["scenes"][0]["reference"].update(mean=1.001 * new["scenes"][0]["reference"]["mean"]), None),
     (lambda new: new["scenes"][1]["reference"].update(disagreements=2), None),

@@ -95,7 +95,7 @@ def test_a_report_goes_on_without_methods_that_are_at_fault(variant, mine, capfd
     assert rows["half"]["error"]["relative_bias"] == pytest.approx(-0.5, abs=1e-5)
     page = (mine / "out" / "report.html").read_text(encoding="utf-8")
     for name, words in FAULTS.items():
-        assert words in rows[name]["refused"]
+        assert words in rows[name]["reason"]
         assert f"airlight: error: method fog_of_mine:{name}: " in printed.err
         assert f"method fog_of_mine:{name}: " in page
     # Those that are at fault in a small frame are told before the work, and nothing of a fault is kept.

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from reports.data.records import MethodRow
+from reports.data.records import Method
 from reports.page.chart import speed_error_chart
 from reports.page.filters import DASH
 from reports.page.render import SCRIPTS, render_page
@@ -134,7 +134,7 @@ def test_bars_of_noisy_methods_go_down_to_their_bias():
 
     noise = {"runs": 8, "bias": 0.0, "bias_within": 0.1, "rmse": 0.2, "rmse_within": 0.1}
     noise |= {"root_bias": None, "most_bias": 0.05}
-    entries = [record_of(entry(str(n), noise=noise if n else None), MethodRow) for n in range(2)]
+    entries = [record_of(entry(str(n), noise=noise if n else None), Method) for n in range(2)]
     panel = Figure().subplots()
     speed_panel(panel, "scene", entries, {"0": {}, "1": {}})
     bars = [bar.get_segments() for bar in panel.collections if np.ptp(bar.get_segments()[0][:, 1])]

@@ -84,7 +84,7 @@ def test_the_data_are_read_again_and_every_file_that_they_name_is_there(written)
     assert 0 < scene["multiple"]["medium"]["value"] < 1
     assert [entry["label"] for entry in scene["methods"]] == [configuration.label for configuration in CHOSEN]
     taylor = scene["methods"][0]
-    assert "tabulated" in taylor["refused"]
+    assert "tabulated" in taylor["reason"]
     assert taylor["files"] == {}
     assert taylor["times"] is taylor["error"] is None
     named = [*scene["files"].values(), *(name for entry in scene["methods"] for name in entry["files"].values())]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from reports.data.records import MethodRow, Scene
+from reports.data.records import Method, Scene
 from reports.tables.agreement import verdict
 from reports.tables.costs import cliffs, scaling_tables
 from reports.tables.drawing import csv, html, latex, markdown, text
@@ -25,7 +25,7 @@ def timing(median):
 
 def entry(label="a", *, rmse=0.01, frame=2.0, nonfinite=0, **more):
     times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame)}
-    return record_of(made(label, times=times, error=errors(rmse, nonfinite=nonfinite)) | more, MethodRow)
+    return record_of(made(label, times=times, error=errors(rmse, nonfinite=nonfinite)) | more, Method)
 
 
 @pytest.mark.parametrize("name", TIMES)
@@ -74,7 +74,7 @@ def test_the_fastest_method_within_each_error_has_a_cell():
     "never",
     [
         entry("no error", rmse=None, frame=0.1),  # a black reference has no relative error
-        entry("refused", refused="no series", times=None, error=None),
+        entry("refused", reason="no series", times=None, error=None),
         entry("not finite", rmse=1e-5, frame=0.1, nonfinite=3),  # its RMSE leaves out the very pixels that are wrong
         entry("image", kind="image", rmse=1e-5, times=None),
     ],
