@@ -129,7 +129,7 @@ def marched_integral(
 def marched_steps(airlight: LitRays, distance: Any, steps: int, spacing: str) -> Steps:
     """Return the steps of rays where a light could reach them and something scatters."""
     light, geometry = airlight.light, airlight.geometry
-    x0, x1 = airlight.segment(distance) if light.w else (type(distance)(0), distance)
-    x0, x1 = airlight.medium.part(airlight.rays, x0, x1, uniform=spacing == "uniform")
+    x0, x1 = airlight.medium.part(airlight.rays, type(distance)(0), distance, uniform=spacing == "uniform")
+    x0, x1 = geometry.lit_segment(x0, x1) if light.w else (x0, x1)
     at_light = (geometry.foot, geometry.height) if spacing == "equiangular" and light.w else None
     return steps_between(x0, x1, steps, at_light)
