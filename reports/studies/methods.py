@@ -59,7 +59,8 @@ def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Any, Calla
     from validation.study.run import run
     from validation.study.study import Cell
 
-    scene, reference = read_scene(loaded.scene), of_image(reference_image(loaded.scene))
+    scene, kept = read_scene(loaded.scene), reference_image.result(loaded.scene)
+    reference = of_image(kept.value, kept.spent)
     path, elsewhere = str(loaded.path or loaded.name), in_own_process if apart else None
 
     def cell(chosen: Any) -> tuple[Any, Any]:

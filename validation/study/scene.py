@@ -269,8 +269,9 @@ def measured(
     cell: Cell, code: list[str], machine: Mapping[str, str], *, study: SceneStudy, apart: Apart | None
 ) -> Judged:
     """Return the row and the image of a cell, whose scene is an identity; `code` is that of the user in it."""
-    asked = replace(cell, scene=study.path)
-    row, frame = run(asked, study.scene, of_image(study.reference), timed_scene=study.timed, apart=apart)
+    asked, kept = replace(cell, scene=study.path), study.kept_reference
+    reference = of_image(kept.value, kept.spent)
+    row, frame = run(asked, study.scene, reference, timed_scene=study.timed, apart=apart)
     row = record_of(row, Row)  # without numbers that are not finite
     return Judged(row, None if frame is None else layered_frame(study.name, cell.chosen, frame))
 
