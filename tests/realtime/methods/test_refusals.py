@@ -24,7 +24,7 @@ from tests.helpers.lamps import lamp_scene
         (
             "shadow-planes",
             {"pattern": "spiral"},
-            "pattern: got 'spiral', expected one of ring, grid, sobol, interleaved",
+            "pattern: got 'spiral', expected one of ring, sobol",
         ),
         ("ray-march", {"jitter": "white", "sum": "transitions"}, "jitter: got white with sum=transitions"),
         ("ray-march", {"jitter": "blue", "tolerance": 0.1}, "expected sum=steps and tolerance=0"),
