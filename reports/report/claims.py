@@ -111,7 +111,6 @@ def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
         filled = {_place(*pair): worst_interval([pair[1]]) for pair in good}
         place, (worst, most) = max(filled.items(), key=lambda item: item[1][1])
         low, high = (100 * (end or 0.0) for end in worst.statistics.relative_bias_ci)
-        # Under area lights the reference has its own errors, and the margin is wider.
         text = (
             f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
             f"of the pooled relative bias lies within its margin. The interval that fills most of its margin, "

@@ -114,13 +114,12 @@ def write_report(
             # that are loaded. A batch of volpath takes eight times as long with ten others.
             gc.collect()
             each = opened(name)
-            begun = dict(zip(parts, sharing(step, parts.items())))
             result = study_scene(
                 each,
                 images=shown.get(scene_stem(each.path), ()),
                 apart=process,
                 ended=ended,
-                progress=lambda part, begun=begun: begun[part](0.0, ""),  # type: ignore[misc]
+                progress=_begins(step, parts),
                 spread=_spread(cluster, each),
                 workers=threads(),
             )
@@ -181,6 +180,12 @@ def settings(study: Study) -> Settings:
         "scaling": study.growth,
     }
     return record_of(asked, Settings)
+
+
+def _begins(progress: Progress, seconds: Mapping[str, float]) -> Callable[[str], None]:
+    """Return what tells that a part of a scene begins, by its name; `seconds`: what each part takes."""
+    parts = dict(zip(seconds, sharing(progress, seconds.items())))
+    return lambda name: parts[name](0.0, "")
 
 
 def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None":
