@@ -3,6 +3,7 @@
 
 import gc
 import os
+import re
 import signal
 from pathlib import Path
 
@@ -11,6 +12,25 @@ import pytest
 # A process that a shell starts in the background ignores Ctrl-C, and so would the commands that tests interrupt.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_addoption(parser):
+    parser.addoption("--allowed-skips", type=Path, help="a file of regular expressions: any other reason of a skip fails")
+
+
+@pytest.hookimpl(trylast=True)  # what pytest found comes first
+def pytest_sessionfinish(session):
+    """Fail a run in which a test was skipped for a reason that is not allowed."""
+    allowed, reporter = session.config.option.allowed_skips, session.config.pluginmanager.get_plugin("terminalreporter")
+    if allowed is None or reporter is None:  # a worker: the process that started it sees all skips
+        return
+    lines = allowed.read_text(encoding="utf-8").splitlines()
+    reasons = [line for line in lines if line and not line.startswith("#")]
+    for skip in reporter.stats.get("skipped", []):
+        why = skip.longrepr[2]
+        if not any(re.search(reason, why) for reason in reasons):
+            reporter.write_line(f"not allowed by {allowed}: {skip.nodeid}: {why}", red=True)
+            session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
 
 
 @pytest.fixture(scope="session")

@@ -160,7 +160,7 @@ def user_object(name: str, kind: str) -> Any:
     if not module_name or not all(part.isidentifier() for part in path.split(".")):
         raise InputError(f"{kind}: got {name!r}, {_WANTED}")
     what = f"{kind} {name}"
-    with user_errors(what):
+    with user_errors(what), _no_bytecode():
         module = _from_file(Path(module_name), what) if _is_file(module_name) else _from_path(module_name, what)
     named_object: Any = module
     for part in path.split("."):
@@ -170,6 +170,17 @@ def user_object(name: str, kind: str) -> Any:
             raise InputError(f"{what}: {module_name} has no {path!r}; {known}")
         named_object = getattr(named_object, part)
     return named_object
+
+
+@contextmanager
+def _no_bytecode() -> Iterator[None]:
+    """Within the block, imports write no `__pycache__`: loading a user's file leaves nothing beside it."""
+    before = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
+    try:
+        yield
+    finally:
+        sys.dont_write_bytecode = before
 
 
 def _is_candidate(value: Any, module: ModuleType) -> bool:

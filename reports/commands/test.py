@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 RECORD = "docs/data/full_run.json"  #: of the last run of all tiers, in the checkout
+WORKER_MEMORY = 4e9  #: [bytes]: the largest worker of a run of all tiers held 3.1 GB
 
 
 def run_tests(*arguments: str, all_: bool = False) -> int:
@@ -18,19 +19,19 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
     The fast tests compile kernels quickly, unless AIRLIGHT_COMPILATION=full asks for what everything else runs. Images
     are the same bit for bit.
 
-    `--all` without arguments for pytest writes the date, the machine and the counts into docs/data/full_run.json. Exit
-    status 1 if anything failed.
+    `--all` without arguments for pytest writes the date, the machine and the counts into docs/data/full_run.json, and
+    fails if a test was skipped for a reason that .ci/skips does not allow. Exit status 1 if anything failed.
 
     Parameters
     ----------
     arguments
-        For pytest, its options too; paths are relative to the checkout. Two processes share the tests if there are two
-        cores; -n 0 is this one.
+        For pytest, its options too; paths are relative to the checkout. As many processes share the tests as there are
+        cores, as far as the memory goes; -n 0 is this one.
     all_
         Also the slow and the statistical tests, injected faults and baselines.
     """
     from reports.machine import quick_compilation
-    from reports.machine.environment import MissingError, prepare, threads
+    from reports.machine.environment import MissingError, prepare
 
     root = Path(__file__).resolve().parents[2]
     if not (root / "tests").is_dir():
@@ -38,7 +39,8 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
             f"there are no tests in {root}, they come with the source only: clone it and run `./airlight test` there"
         )
     variant = prepare().variant
-    sharing = ["-n", "2", "--dist", "worksteal"] if threads() > 1 else []
+    workers = _workers()
+    sharing = ["-n", str(workers), "--dist", "worksteal"] if workers > 1 else []
     os.chdir(root)
     if not all_ and variant == "llvm_ad_rgb" and quick_compilation.VARIABLE not in os.environ:
         os.environ.update(quick_compilation.settings())  # of processes that have not begun
@@ -50,6 +52,14 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
     os.execv(sys.executable, command)
 
 
+def _workers() -> int:
+    """Return how many processes share the tests: a core each, and the memory that a worker needs."""
+    from reports.machine.environment import threads
+
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return max(1, min(threads(), int(memory / WORKER_MEMORY)))
+
+
 def _recorded(command: list[str], root: Path, variant: str) -> int:
     """Run all tests, write the record, and return the exit status."""
     from analytic.clock import stopwatch
@@ -58,7 +68,8 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
 
     took = stopwatch()
     with temporary_folder() as folder:
-        status = subprocess.run([*command, f"--junit-xml={folder / 'tests.xml'}"], check=False).returncode
+        asked = [f"--junit-xml={folder / 'tests.xml'}", "--allowed-skips", ".ci/skips", "--durations=40"]
+        status = subprocess.run([*command, *asked], check=False).returncode
         suite = next(ElementTree.parse(folder / "tests.xml").iter("testsuite"))
     tests, failed, errors, skipped = (int(suite.get(key, 0)) for key in ("tests", "failures", "errors", "skipped"))
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False).stdout

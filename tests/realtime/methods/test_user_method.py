@@ -2,6 +2,7 @@
 """A user's function is a method: its parameters, its result, and its faults with file and line."""
 
 import re
+import sys
 
 import mitsuba as mi
 import numpy as np
@@ -197,6 +198,15 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
 
 
 @pytest.mark.claim("own-method-frozen")
+def test_loading_leaves_nothing_beside_the_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)  # as it is where nothing is set
+    (tmp_path / "neighbour.py").write_text("strength = 1.0\n")
+    (tmp_path / "mine.py").write_text("from neighbour import strength\ndef fog(view):\n    return strength\n")
+    find_method(f"{tmp_path / 'mine.py'}:fog")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.py", "neighbour.py"]
+    assert not sys.dont_write_bytecode
+
+
 def test_only_a_method_that_says_so_is_frozen(own, variant):
     scene = read_scene(mi.load_dict(tiny_scene()))
     assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).stages.render, Frozen)
