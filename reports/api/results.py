@@ -259,7 +259,13 @@ class Reference(LayeredImage):
         if "batches" not in made:
             return lines
         batches, how = int(made["batches"]), self.how
-        lines.append(f"  {made['spp']} samples a pixel in {batches} batches, seeds {made['seeds']}")
+        # A quadrature traces nothing: it has batches only where there are area lights, and they have no seeds.
+        if "spp" in made:
+            kind = "batches"
+            lines.append(f"  {made['spp']} samples a pixel in {batches} batches, seeds {made['seeds']}")
+        else:
+            kind = "sets"
+            lines.append(f"  standard errors from {batches} independent sets of light samples")
         if isinstance(how, MonteCarloReference):
             lines += [f"  {how.cached} of {batches} batches from the cache"] if how.cached else []
             files = "file" if how.damaged == 1 else "files"
@@ -269,7 +275,7 @@ class Reference(LayeredImage):
             lines.append(f"  standard error {100 * how.errors['pooled']:.3g} % of the image, {worst}{left_out}")
         if batches < 32:
             known = 100 / (2 * (batches - 1)) ** 0.5
-            lines.append(f"  a standard error from {batches} batches is known to {known:.0f} % only")
+            lines.append(f"  a standard error from {batches} {kind} is known to {known:.0f} % only")
         return lines if self.passed else [*lines, "  the target error was not reached"]
 
     @property

@@ -48,6 +48,16 @@ def test_results_are_frozen_and_so_are_their_arrays(name):
     own[0] = 0  # one's own
 
 
+@pytest.mark.parametrize("show", [Reference.text, Reference._repr_html_], ids=["terminal", "notebook"])
+def test_a_quadrature_of_an_area_light_says_where_its_standard_errors_come_from(show):
+    """Its header has a number of batches, but no samples a pixel and no seeds: it traced nothing."""
+    image = layered(dtype=np.float64, airlight_se=np.full((4, 6, 3), 1e-3))
+    image.attributes["airlight:batches"] = 8
+    shown = show(Reference(scene="panel", image=sealed(image), estimator="quadrature", relative_error=3e-3))
+    assert "standard errors from 8 independent sets of light samples" in shown
+    assert "seeds" not in shown
+
+
 @pytest.mark.claim("results-are-frozen")
 def test_numpy_takes_a_result_as_its_total():
     frame = rendering()
