@@ -15,7 +15,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_addoption(parser):
-    parser.addoption("--allowed-skips", type=Path, help="a file of regular expressions: any other reason of a skip fails")
+    words = "a file of regular expressions: a skip for any other reason fails the run"
+    parser.addoption("--allowed-skips", type=Path, help=words)
 
 
 @pytest.hookimpl(trylast=True)  # what pytest found comes first

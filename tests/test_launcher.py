@@ -120,6 +120,23 @@ def test_the_packages_of_a_command_wait_for_its_first_start(machine, command):
     assert _log(machine) == ["uv", "uv"]
 
 
+def test_commands_by_turns_install_their_packages_once(machine):
+    for command in ("list", "sweep", "test"):
+        _start(machine, command)
+    _log(machine)
+    for command in ("sweep", "test", "list", "sweep"):
+        assert _start(machine, command).stderr == ""
+    assert _log(machine) == []
+
+
+@pytest.mark.parametrize("line", [["sweep", "--help"], ["test", "-h"]])
+def test_help_installs_no_packages_of_a_command(machine, line):
+    _start(machine, "list")
+    _log(machine)
+    assert _start(machine, *line).stderr == ""
+    assert _log(machine) == []
+
+
 def test_an_interrupted_first_start_is_repaired(machine):
     (machine / "programs" / "pip-fails").touch()
     (machine / "programs" / "uv-fails").touch()
