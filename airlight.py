@@ -13,15 +13,38 @@ True
 Every command is a function of the same name; the other names are what these are made of.
 """
 
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+
+
+def _load_own_packages() -> None:
+    """Load the five packages from beside this file: a user's folder may hold packages of the same names."""
+    for name in ("analytic", "realtime", "reference", "validation", "reports"):
+        page = Path(__file__).with_name(name) / "__init__.py"
+        loaded = getattr(sys.modules.get(name), "__file__", None)
+        if name not in sys.modules:
+            spec = importlib.util.spec_from_file_location(name, page)
+            assert spec is not None and spec.loader is not None  # of a file that ends in .py
+            sys.modules[name] = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(sys.modules[name])
+        elif loaded is None or not page.samefile(loaded):
+            raise ImportError(
+                f"airlight has a package {name!r}, and {loaded or sys.modules[name]} was imported under this name "
+                "before: import airlight first, or rename that one"
+            )
+
+
+_load_own_packages()
+
 if __name__ == "__main__":  # before all that takes time: what a signal meets during an import ends in a traceback
     from reports.commands.start import main as start
 
     start()
 
 import ast
-import importlib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reports import __version__

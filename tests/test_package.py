@@ -80,6 +80,21 @@ def test_help_imports_nothing_heavy():
     assert "report" in _python(code)
 
 
+def test_packages_of_the_same_names_beside_a_script_are_not_taken_for_ours(tmp_path):
+    for name in ("reports", "analytic"):  # a package, and a folder without a file of Python
+        (tmp_path / name).mkdir()
+    (tmp_path / "reports" / "__init__.py").touch()
+    (tmp_path / "validation.py").write_text("raise SystemExit('a module of the user')\n")
+    (tmp_path / "script.py").write_text("import airlight\nprint(airlight.SCENES['open-fog'].name)\n")
+    world = os.environ | {"PYTHONPATH": str(ROOT)}
+    for command in (["script.py"], ["-m", "airlight", "list", "papers"]):
+        ran = subprocess.run([sys.executable, *command], cwd=tmp_path, env=world, capture_output=True, text=True)
+        assert ran.returncode == 0, ran.stderr
+    code = "import reports, airlight"
+    ran = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=world, capture_output=True, text=True)
+    assert "import airlight first, or rename that one" in ran.stderr.splitlines()[-1]
+
+
 @pytest.mark.slow
 @pytest.mark.claim("wheel-holds-the-packages")
 def test_a_wheel_holds_every_file_of_the_packages_and_nothing_else(tmp_path):

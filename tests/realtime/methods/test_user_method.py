@@ -198,6 +198,12 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
 
 
 @pytest.mark.claim("own-method-frozen")
+def test_a_package_that_has_the_name_of_one_of_ours_is_named(tmp_path):
+    (tmp_path / "mine.py").write_text("from realtime.numbers import strength\n")
+    with pytest.raises(InputError, match="has a package 'realtime' itself, which was found first: rename yours"):
+        find_method(f"{tmp_path / 'mine.py'}:fog")
+
+
 def test_loading_leaves_nothing_beside_the_file(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "dont_write_bytecode", False)  # as it is where nothing is set
     (tmp_path / "neighbour.py").write_text("strength = 1.0\n")
