@@ -26,7 +26,8 @@ def _load_own_packages() -> None:
         loaded = getattr(sys.modules.get(name), "__file__", None)
         if name not in sys.modules:
             spec = importlib.util.spec_from_file_location(name, page)
-            assert spec is not None and spec.loader is not None  # of a file that ends in .py
+            assert spec is not None
+            assert spec.loader is not None  # of a file that ends in .py
             sys.modules[name] = importlib.util.module_from_spec(spec)
             spec.loader.exec_module(sys.modules[name])
         elif loaded is None or not page.samefile(loaded):
