@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How many small faults of the code do the default tests not see?
+
+`python docs/tools/mutations.py` draws a sample of mutations in the rooms that decide what users are told, makes each in
+a copy of the checkout, and runs the default tests that run the line. A mutation survives if all of these pass; one on a
+line that no test runs survives too. Survivors are written to `docs/data/mutations.json`: each gets a judgement there,
+in words, since a mutation may change nothing that anybody sees.
+
+The mutations are those of Cosmic Ray (`pip install cosmic-ray pytest-cov`): a comparison, an operator or a number is
+replaced, a condition is turned, a loop does not run. They are drawn from all mutations of the rooms with equal chances.
+The tests of a line come from a run of the default tests with coverage, whose contexts say which test runs which line. A
+line that runs once, when its file is imported, has the tests that run anything of the file. The fastest are run first,
+and no more of them than take LONGEST.
+"""
+
+import argparse
+import ast
+import json
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from queue import SimpleQueue
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORD = ROOT / "docs/data/mutations.json"
+ROOMS = (
+    "reports/api",
+    "validation/motion",
+    "validation/engine",
+    "validation/papers",
+    "validation/study",
+    "realtime/methods",
+)
+OPERATORS = (  # each of one kind: two comparisons that differ in equality alone are one mutation here
+    "AddNot",
+    "NumberReplacer",
+    "ReplaceAndWithOr",
+    "ReplaceOrWithAnd",
+    "ReplaceTrueWithFalse",
+    "ReplaceFalseWithTrue",
+    "ReplaceUnaryOperator_Delete_Not",
+    "ReplaceUnaryOperator_Delete_USub",
+    "ReplaceBinaryOperator_Add_Sub",
+    "ReplaceBinaryOperator_Sub_Add",
+    "ReplaceBinaryOperator_Mul_Div",
+    "ReplaceBinaryOperator_Div_Mul",
+    "ReplaceComparisonOperator_Eq_NotEq",
+    "ReplaceComparisonOperator_NotEq_Eq",
+    "ReplaceComparisonOperator_Lt_GtE",
+    "ReplaceComparisonOperator_Gt_LtE",
+    "ReplaceComparisonOperator_LtE_Lt",
+    "ReplaceComparisonOperator_GtE_Gt",
+    "ZeroIterationForLoop",
+)
+#: A mutation may make a loop endless. Tests take longer beside other work; their process starts in some ten seconds.
+PATIENCE, START = 5.0, 60.0
+LONGEST = 120.0  #: what the tests of a mutation may take together, without START [s]
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """One mutation of a file."""
+
+    path: str  #: from the root of the checkout
+    line: int  #: from 1 on
+    operator: str  #: Cosmic Ray's name
+    occurrence: int  #: its number in the file, among those of the operator
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the tests said of a mutation."""
+
+    mutation: Mutation
+    survived: bool
+    tests: int  #: how many run the line
+    change: str  #: the line before, and after
+    judgement: str = ""  #: of a survivor: why nobody would feel it, or the test that it got
+
+
+def mutations(rooms: Sequence[str]) -> Iterator[Mutation]:
+    """Yield all mutations of the files of some rooms."""
+    from cosmic_ray.ast import ast_nodes, get_ast
+    from cosmic_ray.plugins import get_operator
+
+    operators = {name: get_operator(f"core/{name}")() for name in OPERATORS}
+    for path in (path for room in rooms for path in sorted((ROOT / room).rglob("*.py"))):
+        nodes = list(ast_nodes(get_ast(path.read_text(encoding="utf-8"))))
+        for name, operator in operators.items():
+            places = [place for node in nodes for place in operator.mutation_positions(node)]
+            for occurrence, ((line, _), _) in enumerate(places):
+                yield Mutation(path.relative_to(ROOT).as_posix(), line, name, occurrence)
+
+
+def mutated(mutation: Mutation, text: str) -> str | None:
+    """Return the text of a file with a mutation; None if it changes nothing."""
+    from cosmic_ray.mutating import mutate_code
+    from cosmic_ray.plugins import get_operator
+
+    changed = mutate_code(text, get_operator(f"core/{mutation.operator}")(), mutation.occurrence)
+    return None if changed in (None, text) else str(changed)
+
+
+def covering_tests(rooms: Sequence[str]) -> tuple[dict[tuple[str, int], set[str]], dict[str, float]]:
+    """Run the default tests; return the tests of each line of the rooms, and what each test took [s]."""
+    from coverage import CoverageData
+
+    with tempfile.TemporaryDirectory() as folder:
+        measured = [f"--cov={room}" for room in rooms]
+        options = ["--cov-context=test", "--cov-report=", f"--junit-xml={folder}/tests.xml"]
+        subprocess.run([ROOT / "airlight", "test", "-q", *measured, *options], cwd=ROOT, check=True)
+        suite = ElementTree.parse(f"{folder}/tests.xml")
+    took: dict[str, float] = {}
+    for case in suite.iter("testcase"):
+        place = case.get("classname", "").replace(".", "/")
+        took[f"{place}.py::{case.get('name')}"] = float(case.get("time", 0))
+    data = CoverageData(str(ROOT / ".coverage"))
+    data.read()
+    tests = defaultdict(set)
+    for file in data.measured_files():
+        path = Path(file).relative_to(ROOT).as_posix()
+        for line, contexts in data.contexts_by_lineno(file).items():
+            # A context is 'tests/a/test_b.py::test_c[d]|run'; what is set up for a test is no test.
+            tests[path, line] |= {name.partition("|")[0] for name in contexts if name.endswith("|run")}
+    (ROOT / ".coverage").unlink()
+    return tests, took
+
+
+def tests_of(mutation: Mutation, found: Mapping[tuple[str, int], set[str]], took: Mapping[str, float]) -> list[str]:
+    """Return the tests that run the statement of a mutation, the fastest first."""
+    text = (ROOT / mutation.path).read_text(encoding="utf-8")
+    around = [each for each in ast.walk(ast.parse(text)) if isinstance(each, ast.stmt)]
+    around = [each for each in around if each.lineno <= mutation.line <= (each.end_lineno or each.lineno)]
+    innermost = max(around, key=lambda each: each.lineno)
+    body = getattr(innermost, "body", None)
+    end = body[0].lineno - 1 if body else innermost.end_lineno or innermost.lineno
+    tests = set().union(*(found.get((mutation.path, line), set()) for line in range(innermost.lineno, end + 1)))
+    at_import = not any(isinstance(each, ast.FunctionDef) and each is not innermost for each in around)
+    if at_import:
+        tests = set().union(*(those for (path, _), those in found.items() if path == mutation.path))
+    chosen, seconds = [], 0.0
+    for test in sorted(tests, key=lambda test: took.get(test, 0.0)):
+        seconds += took.get(test, 0.0)
+        if chosen and seconds > LONGEST:
+            break
+        chosen.append(test)
+    return chosen
+
+
+def outcome(mutation: Mutation, copy: Path, tests: Sequence[str], seconds: float) -> Outcome:
+    """Run tests in a copy of the checkout that has a mutation; they take `seconds` without it."""
+    path = copy / mutation.path
+    before = path.read_text(encoding="utf-8")
+    after = mutated(mutation, before) or before
+    lines = [text.splitlines()[mutation.line - 1].strip() for text in (before, after)]
+    try:
+        path.write_text(after, encoding="utf-8")
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]
+        limit = START + PATIENCE * seconds
+        status = subprocess.run(command, cwd=copy, capture_output=True, timeout=limit).returncode if tests else 0
+    except subprocess.TimeoutExpired:
+        status = 1
+    finally:
+        path.write_text(before, encoding="utf-8")
+    return Outcome(mutation, status == 0, len(tests), " -> ".join(lines))
+
+
+def survey(chosen: Sequence[Mutation], found: Mapping[tuple[str, int], set[str]], took: Mapping[str, float], jobs: int):
+    """Yield the outcome of each mutation; `jobs` of them are tried at a time, each in a copy of its own."""
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
+        copies: SimpleQueue[Path] = SimpleQueue()
+        tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+        for number in range(jobs):
+            for name in filter(None, tracked.split("\0")):
+                place = Path(folder, str(number), name)
+                place.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(ROOT / name, place)
+            copies.put(Path(folder, str(number)))
+
+        def tried(mutation: Mutation) -> Outcome:
+            tests = tests_of(mutation, found, took)
+            copy = copies.get()
+            try:
+                return outcome(mutation, copy, tests, sum(took.get(test, 0.0) for test in tests))
+            finally:
+                copies.put(copy)
+
+        yield from pool.map(tried, chosen)
+
+
+def main() -> None:
+    """Draw mutations, try them, and write what survived."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("rooms", nargs="*", default=ROOMS, help="folders of the checkout")
+    parser.add_argument("--sample", type=int, default=300, help="how many mutations are drawn")
+    parser.add_argument("--seed", type=int, default=1, help="of the draw")
+    parser.add_argument("--jobs", type=int, default=2, help="how many are tried at a time")
+    asked = parser.parse_args()
+    every = list(mutations(asked.rooms))
+    chosen = random.Random(asked.seed).sample(every, min(asked.sample, len(every)))
+    found, took = covering_tests(asked.rooms)
+    outcomes, start = [], time.monotonic()
+    for each in survey(chosen, found, took, asked.jobs):
+        outcomes.append(each)
+        if each.survived:
+            print(f"survives {each.mutation.path}:{each.mutation.line} ({each.tests} tests): {each.change}", flush=True)
+    survivors = [each for each in outcomes if each.survived]
+    record = {
+        "date": time.strftime("%Y-%m-%d"),
+        "rooms": list(asked.rooms),
+        "of": len(every),
+        "sample": len(outcomes),
+        "seed": asked.seed,
+        "survived": len(survivors),
+        "untested": sum(each.tests == 0 for each in survivors),
+        "survivors": [asdict(each) for each in survivors],
+    }
+    RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    minutes = (time.monotonic() - start) / 60
+    print(f"{len(survivors)} of {len(outcomes)} survived, in {minutes:.0f} minutes; written: {RECORD}")
+
+
+if __name__ == "__main__":
+    main()
