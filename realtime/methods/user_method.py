@@ -17,9 +17,9 @@ import inspect
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, make_dataclass, replace
+from dataclasses import dataclass, field, fields, make_dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -48,10 +48,12 @@ def user_method(name: str) -> type[Method]:
     Raises
     ------
     InputError
-        For what cannot be imported, is not there or is no function, and a function that no frame can call.
+        For what cannot be imported, is not there or is no function, a function that no frame can call, and a parameter
+        with the name of a member of `Method`.
     """
     found = user_object(name, "method")
     if isinstance(found, type) and issubclass(found, Method):
+        check_names(name, (item.name for item in fields(found)), Method)
         return _guarded(found, name)
     if isinstance(found, type) or not callable(found):
         kind = "class" if isinstance(found, type) else type(found).__name__
@@ -61,13 +63,36 @@ def user_method(name: str) -> type[Method]:
     return _of_function(found, name)
 
 
+def check_names(method: str, names: Iterable[str], kind: type[Method]) -> None:
+    """Refuse parameters of a user's method that would overwrite a member of its class.
+
+    Parameters
+    ----------
+    method
+        The name of the method, for messages.
+    names
+        The names of its parameters.
+    kind
+        The class that the method is made from.
+
+    Raises
+    ------
+    InputError
+        For a name that the class has.
+    """
+    taken = sorted(set(names) & set(dir(kind)))
+    if taken:
+        raise InputError(f"method {method}: a parameter cannot be called {taken[0]}, a name that frames use; rename it")
+
+
 def _of_function(function: Any, name: str) -> type[Method]:
     """Return a plain function of the view as a method."""
     takes_kernel, parameters = _signature(function, name)
-    fields = [(key, type(default), field(default=default)) for key, default in parameters.items()]
+    check_names(name, parameters, Method)
+    items = [(key, type(default), field(default=default)) for key, default in parameters.items()]
     by_rays = bool(getattr(function, "by_rays", False))
     if by_rays:
-        fields = [*(entry for entry in fields if entry[0] != "tolerance"), ("tolerance", float, tolerance())]
+        items = [*(item for item in items if item[0] != "tolerance"), ("tolerance", float, tolerance())]
     prepare = getattr(function, "prepare", None)
     if prepare is not None and not callable(prepare):
         raise InputError(
@@ -111,8 +136,8 @@ def _of_function(function: Any, name: str) -> type[Method]:
         "render": render,
     }
     if not by_rays:
-        what["interpolated"] = 0.0  # a parameter of that name is the user's
-    return make_dataclass("UserMethod", fields, bases=(Method,), frozen=True, namespace=what)
+        what["interpolated"] = 0.0  # a parameter `tolerance` is the user's
+    return make_dataclass("UserMethod", items, bases=(Method,), frozen=True, namespace=what)
 
 
 def _guarded(method: type[Method], name: str) -> type[Method]:

@@ -258,8 +258,9 @@ class Method(Parameters):
 
     @property
     def noisy(self) -> bool:
-        """Whether its image depends on the number of the run, as `View.run`: by default, if it has a `jitter`."""
-        return getattr(self, "jitter", "none") != "none"
+        """Whether its image depends on the number of the run, as `View.run`: by default, by the word `jitter`."""
+        jitter = getattr(self, "jitter", "none")
+        return isinstance(jitter, str) and jitter != "none"
 
     @property
     def interpolated(self) -> float:

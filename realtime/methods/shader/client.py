@@ -3,7 +3,6 @@
 
 import io
 import json
-import math
 import os
 import struct
 import subprocess
@@ -18,15 +17,16 @@ from typing import Any
 from realtime.errors import InputError, NoDriverError
 
 _LIMIT, LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"  # that a user's method may take for one scene or command [s]
+_LONGEST = 2e9  # s: `signal.alarm`, by which the host ends a driver that never returns, takes 2^31 - 1 at most
 
 
 def method_limit() -> float:
     """Return how long a user's method may take for one scene, or one command [s]."""
     given = os.environ.get(LIMIT_VARIABLE) or str(_LIMIT)
     with suppress(ValueError):
-        if 0 < float(given) < math.inf:
+        if 0 < float(given) <= _LONGEST:
             return float(given)
-    raise InputError(f"{LIMIT_VARIABLE}: got {given!r}, expected a time above 0, such as 300 [s]")
+    raise InputError(f"{LIMIT_VARIABLE}: got {given!r}, expected a time above 0 up to {_LONGEST:g}, such as 300 [s]")
 
 
 class ShaderHost:

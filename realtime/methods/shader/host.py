@@ -5,7 +5,8 @@ It is asked on the standard input and answers on the standard output. A message 
 archive, whose entry `message` is JSON:
 
     open    stages, each with name, text, kind ('picture', '2d', '3d'), size, format, and the words that it uses
-    frame   arrays, and how many frames to draw, after forgetting the last ones if `reset`
+    frame   arrays, and how many frames to draw, after forgetting the last ones if `reset`; the answer has the names of
+            the shader that nothing sets
     again   draws the same for some seconds, and answers with the time of each frame
 
 A time is the wall clock's from the first call to the end of `finish()` where the processor draws: the timer queries of
@@ -26,6 +27,7 @@ import numpy as np
 
 _SOFTWARE = ("llvmpipe", "softpipe", "SwiftShader")
 _TARGETS = {"rgba16f": (4, "f2"), "rgba32f": (4, "f4"), "r32f": (1, "f4")}
+_GIVEN = ("frame", "al_size", "al_target", "AlLights", "AlPhase")  # beside the uniforms and arrays of a message
 _VERTICES = """#version 430 core
 void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }
 """
@@ -111,6 +113,13 @@ class Host:
         self.frame += 1
         return took
 
+    def _unset(self):
+        """Return the uniforms, samplers and buffers that the programs read and nothing here sets."""
+        images = {f"{stage['name']}_{end}" for stage in self.stages[:-1] for end in ("image", "last")}
+        given = {*self.uniforms, *self.textures, *images, *_GIVEN}
+        names = (name for program, _ in self.programs for name in program if not name.startswith("gl_"))
+        return sorted({*names} - given)
+
     def _stages(self, uniforms):
         now, last = self.frame & 1, 1 - (self.frame & 1)
         for number, (stage, (program, triangle)) in enumerate(zip(self.stages, self.programs, strict=True)):
@@ -152,7 +161,7 @@ class Host:
         image, _ = self.targets[-1][0]
         width, height = self.stages[-1]["size"]
         pixels = np.frombuffer(image.read(), dtype=np.float32).reshape(height, width, 4)
-        return {"ms": times}, {"image": pixels[..., :3]}
+        return {"ms": times, "unset": self._unset()}, {"image": pixels[..., :3]}
 
     def again(self, message, arrays):
         """Draw the same for some seconds, at least three times."""

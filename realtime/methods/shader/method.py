@@ -18,7 +18,7 @@ from realtime.methods.shader.client import ShaderHost
 from realtime.methods.shader.prelude import phase_text, stage_text
 from realtime.methods.shader.scene_arrays import check_scene, light_array, map_array, phase_table, ray_arrays, uniforms
 from realtime.methods.shader.source import ShaderSource, read_shader
-from realtime.methods.user_method import checked_radiance
+from realtime.methods.user_method import check_names, checked_radiance
 from realtime.parameters import parameter, values
 from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_size
 
@@ -81,7 +81,7 @@ class Shader(Method):
         return run
 
     def render(self, view, state, kernel):
-        """Return the image of the shader; values that are not finite are refused."""
+        """Return the image of the shader; uniforms that nothing sets and values that are not finite are refused."""
         host, maps = state
         arrays: dict[str, Any] = ray_arrays(view, surfaces=bool({"g_normal", "g_albedo"} & self.shader.words))
         arrays["layers shadow_maps"] = map_array(maps)
@@ -89,7 +89,8 @@ class Shader(Method):
         own = {each.name: getattr(self, each.name) for each in self.shader.parameters if each.uniform}
         first = not self.carries or view.carried is None
         asked = {"reset": first, "frames": self.shader.frames if first else 1, "uniforms": uniforms(view) | own}
-        _, image = host.ask("frame", arrays, **asked)
+        said, image = host.ask("frame", arrays, **asked)
+        self.shader.check_unset(said["unset"])
         wrong = ~np.isfinite(image[::-1]).all(axis=2)
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
@@ -115,9 +116,7 @@ def shader_method(name: str) -> type[Method]:
     fields: list[Any] = [
         (each.name, type(each.default), parameter(each.default, each.help)) for each in source.parameters
     ]
-    clash = {each.name for each in source.parameters} & {*dir(Shader), "points", "pattern"}
-    if clash:
-        raise InputError(f"method {name}: a parameter cannot be called {min(clash)}; rename it")
+    check_names(name, (each.name for each in source.parameters), Shader)
     what = {"name": name, "source": str(source.path), "shader": source, "shadows": source.shadows}
     return make_dataclass("UserShader", fields, bases=(Shader,), frozen=True, namespace=what)
 

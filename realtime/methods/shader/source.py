@@ -16,7 +16,9 @@ own: the user's file from 1, an included one from a separate million.
 
 import keyword
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 
 from realtime.errors import InputError
@@ -35,6 +37,7 @@ _ERRORS = (
     re.compile(r"^\d+\((\d+)\) : error \w+: (.*)$", re.MULTILINE),
     re.compile(r"^ERROR: \d+:(\d+): (.*)$", re.MULTILINE),
 )
+_INITIAL = r"(?<!airlight )\buniform\b[^;]*\b{}\s*(?:\[[^\]]*\]\s*)?=(?!=)"  # a uniform's initial value
 _WAYS_OUT = {"texture2D": "add `#define texture2D texture`", "texture3D": "add `#define texture3D texture`"}
 
 
@@ -82,6 +85,12 @@ class ShaderSource:
             found = pattern.search(log)
             if found:
                 number, words = int(found[1]), " ".join(found[2].split())
+                if words.endswith("candidates are:"):  # They follow one a line, set in.
+                    following = map(pattern.match, log[found.end() :].splitlines()[1:])
+                    candidates = takewhile(
+                        lambda words: words.startswith(" "), (line[2] if line else "" for line in following)
+                    )
+                    words += " " + "; ".join(map(str.strip, candidates))
                 words += "".join(f"; {way}" for name, way in _WAYS_OUT.items() if name in words)
                 place, line = divmod(number, _BLOCK)
                 if place == 0 or 2 <= place <= len(self.files):
@@ -92,6 +101,27 @@ class ShaderSource:
                 return f"{self.path.name}: {words}"
         lines_of_log = [line.strip() for line in log.splitlines() if "error" in line.lower()]
         return f"{self.path.name}: {lines_of_log[0] if lines_of_log else ' '.join(log.split())}"
+
+    def check_unset(self, names: Sequence[str]) -> None:
+        """Refuse uniforms, samplers and buffers that the driver reads and nothing sets: they would be 0.
+
+        Parameters
+        ----------
+        names
+            Their names. One that the text gives an initial value is set.
+
+        Raises
+        ------
+        InputError
+            With those that are not set.
+        """
+        unset = [name for name in names if not re.search(_INITIAL.format(re.escape(name)), self.text)]
+        if unset:
+            raise InputError(
+                f"method {self.path}: {self.path.name}: nothing sets {', '.join(unset)}; give a uniform a value, "
+                "`uniform float NAME = 1.0;`, or make it a parameter, `#pragma airlight uniform NAME 1.0`; samplers "
+                "and buffers are those that airlight gives"
+            )
 
 
 def is_shader(name: str) -> bool:
@@ -141,7 +171,7 @@ class _Reader:
 
     def read(self, path: Path, within: tuple[Path, ...]) -> str:
         try:
-            text = path.read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8-sig")  # editors of Windows write a byte order mark
         except (OSError, UnicodeDecodeError) as error:
             words = error.strerror if isinstance(error, OSError) and error.strerror else "it is no text in UTF-8"
             raise InputError(f"{self.what}: {path} cannot be read: {words}") from error

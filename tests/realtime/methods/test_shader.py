@@ -169,6 +169,11 @@ def test_a_mistake_has_the_users_file_and_line_after_an_include_too(tmp_path):
             "line 2: 'texture2D' : no; add `#define texture2D texture`",
         ),
         ("error: too many uniforms\n", "fog.glsl: error: too many uniforms"),
+        (
+            "0:2(9): error: no f(int); candidates are:\n0:2(9): error:    f(vec2)\n0:2(9): error:    f(vec3)\n"
+            "0:2(3): error: another\n",
+            "line 2: no f(int); candidates are: f(vec2); f(vec3): second",
+        ),
     ],
 )
 def test_messages_of_other_drivers_are_read(tmp_path, log, words):
@@ -196,6 +201,31 @@ def test_what_no_driver_must_see_is_found_in_the_text(tmp_path, text, words):
     (tmp_path / "fog.glsl").write_text(text)
     with pytest.raises(InputError, match=words):
         find_method(str(tmp_path / "fog.glsl"))
+
+
+def test_a_byte_order_mark_before_the_text_changes_nothing(drawn):
+    text = "vec3 airlight(Ray ray) { return vec3(ray.distance); }"
+    np.testing.assert_array_equal(drawn(f"\ufeff{text}").airlight, drawn(text).airlight)
+
+
+@pytest.mark.parametrize(
+    ("given", "unset"),
+    [
+        ("uniform vec3 tint; uniform float time;", "time, tint"),
+        ("uniform vec3 tint = vec3(1.0); uniform sampler2D noise; float time = texture(noise, vec2(0)).r;", "noise"),
+        ("buffer Tints { vec3 tint; float time; };", "Tints"),
+        ("#pragma airlight uniform time 1.0\nuniform struct { vec3 on; } sky; vec3 tint = sky.on;", "sky.on"),
+        ("uniform float time = 0.0, other = 2.0; uniform vec3 tint=vec3(1.0);", ""),
+    ],
+)
+def test_what_nothing_sets_is_refused_by_name(drawn, given, unset):
+    """OpenGL makes it 0: the image would be black, and no error."""
+    text = f"{given}\nvec3 airlight(Ray ray) {{ return tint * (1.0 + time); }}"
+    if not unset:
+        drawn(text)
+        return
+    with pytest.raises(InputError, match=f"fog.glsl: nothing sets {unset}; give a uniform a value"):
+        drawn(text)
 
 
 def test_radiance_that_is_not_finite_is_refused_by_pixel(drawn):
@@ -232,6 +262,18 @@ vec3 airlight(Ray ray) { float x = ray.distance; for (int i = 0; i < 60000; ++i)
 """
     with pytest.raises(InputError, match=r"no frame within 1\.5 s; its process was ended; AIRLIGHT_METHOD_LIMIT=3 all"):
         drawn(text)
+
+
+@pytest.mark.parametrize("limit", ["0", "nan", "inf", "1e12", "soon"])
+def test_a_limit_of_time_is_one_that_every_process_can_keep(monkeypatch, limit):
+    monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", limit)
+    with pytest.raises(InputError, match=r"AIRLIGHT_METHOD_LIMIT: got '.*', expected a time above 0 up to 2e\+09"):
+        ShaderHost("fog.glsl")
+
+
+def test_the_longest_limit_of_time_draws(drawn, monkeypatch):
+    monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", "2e9")
+    assert (drawn(_BLACK).airlight == 0).all()
 
 
 def test_a_process_that_ends_is_a_fault_and_no_driver_is_missing(monkeypatch, tmp_path):

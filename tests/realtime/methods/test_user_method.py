@@ -62,6 +62,17 @@ def ready(view, size=2): return mi.Color3f(view.prepared[0])
 ready.prepare = lambda scene, size: lambda scene: (float(size),)
 def unready(view): return 1
 unready.prepare = lambda scene: None
+def averaged(view, *, history=0.9): return 1
+def hidden(view, *, shadows=False): return 1
+def drawn(view, *, render=1): return 1
+@dataclass(frozen=True)
+class Averaged(Method):
+    history: float = 0.9
+@dataclass(frozen=True)
+class Shifted(Method):
+    uses_kernel = False
+    jitter: float = 0.25
+    def render(self, view, state, kernel): return Layers(self.jitter)
 @dataclass(frozen=True)
 class Record(Method):
     uses_kernel = False
@@ -118,6 +129,7 @@ def test_the_signature_decides(own):
         ("calls", (1, 1, 1)),
         ("ready", (2, 2, 2)),
         ("Record", (2, 2, 2)),
+        ("Shifted", (0.25, 0.25, 0.25)),
     ],
 )
 def test_what_is_returned_becomes_an_image(render, name, wanted):
@@ -177,11 +189,21 @@ def test_what_a_method_refuses_is_no_fault(render):
         ("gone", "has no 'gone'; it has grey, vector"),
         ("NUMBER", "this is a int; expected a function of the view"),
         ("wants", "nothing gives 'steps' a value; expected a keyword with a default"),
+        ("averaged", "a parameter cannot be called history, a name that frames use; rename it"),
+        ("hidden", "a parameter cannot be called shadows"),
+        ("drawn", "a parameter cannot be called render"),
+        ("Averaged", "a parameter cannot be called history"),
     ],
 )
 def test_what_is_no_method_is_refused(own, name, message):
     with refused(message):
         find_method(f"{own}:{name}")
+
+
+def test_a_number_called_jitter_makes_no_method_noisy(own):
+    """`jitter` names a pattern of the built-in methods; a user's may be the length of a shift."""
+    assert not find_method(f"{own}:Shifted")().noisy
+    assert find_method("ray-march")(jitter="blue").noisy
 
 
 @pytest.mark.claim("own-method-faults")
