@@ -305,9 +305,10 @@ def _scene_features(
             )
     phases = [bounded_medium.medium.phase for bounded_medium in medium.bounded_media]
     phases += list(medium.clouds.phases) if medium.clouds else [medium.phase] * (not medium.clear)
+    # A light by itself casts no shadow, unless parts of it stand in the light of others.
+    alone = not lights and len(area_lights) == 1 and area_lights[0].opaque and not area_lights[0].folded
     return SceneFeatures(
-        # A light never shadows itself.
-        shadows=len(opaque) > (1 if len(area_lights) == 1 and area_lights[0].opaque and not lights else 0),
+        shadows=len(opaque) > (1 if alone else 0),
         surfaces=bool(opaque),
         extinctions=medium.channels,
         isotropic=all(phase.constant for phase in phases),

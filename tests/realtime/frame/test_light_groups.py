@@ -61,6 +61,17 @@ def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
     assert relative_rmse(frame.surface, surface) < (0.1 if name == "light-volumes" else 1e-4)
 
 
+def test_a_folded_lamp_alone_shadows_itself_and_another_does_not(variant):
+    """A speck far behind the camera, which makes any scene one with shadows, changes nothing."""
+    speck = {"type": "sphere", "center": [3.0, 1.0, -500.0], "radius": 1e-3}
+    alone, beside = (
+        read(lit_scene(size=(8, 6), lamp=ring(), **more)) for more in ({}, {"speck": speck})
+    )
+    airlight, expected = (render(scene, "ray-march", points=2, steps=50).airlight for scene in (alone, beside))
+    np.testing.assert_allclose(airlight, expected, rtol=1e-5)
+    assert not read(lit_scene(lamp=lamp("sphere", center=[0.3, 0.4, 2.9]))).features.shadows
+
+
 def _two_spots():
     """Return a scene with a hard and a soft spot in bounded media."""
     spot = {"type": "spot", "to_world": mi.ScalarTransform4f().look_at([1.3, -0.7, 2.1], [0.1, 0.2, 0.3], [0, 0, 1])}
