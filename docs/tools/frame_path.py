@@ -23,7 +23,7 @@ def files_of_frame(scene: str, method: str) -> list[str]:
     loaded, passed = load_scene(scene, (64, 48)).scene, dict[str, None]()
     sys.setprofile(lambda frame, event, _: passed.setdefault(frame.f_code.co_filename) if event == "call" else None)
     try:
-        render_frame(frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"].function))
+        render_frame(frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"]))
     finally:
         sys.setprofile(None)
     paths = (Path(name) for name in passed)

@@ -36,10 +36,11 @@ from realtime.frame.history import HistoryPass
 from realtime.frame.light_on_ray import check_radiance
 from realtime.frame.sphere_lights import sampled_sphere, sphere_scales
 from realtime.frame.surface import Cast, surface_stages
+from realtime.kernels.registry import Kernel
 from realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
 from realtime.numerics.array_types import PerRay, aligned_array
 from realtime.numerics.noise import Noise, blue_mask
-from realtime.numerics.recorded import Frozen, prepare_kernel, refusals
+from realtime.numerics.recorded import Frozen, refusals
 from realtime.parameters import values
 from realtime.scene.camera import TILE, tiled_pixels
 from realtime.scene.light_samples import with_light_samples
@@ -141,12 +142,12 @@ class Rendered:
 
 
 def frame_renderer(
-    scene: Scene, method: type[Method], *, kernel=None, extra_layers: bool = False, **parameters
+    scene: Scene, method: type[Method], *, kernel: Kernel | None = None, extra_layers: bool = False, **parameters
 ) -> FrameRenderer:
     """Prepare the stages of a frame.
 
-    `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an airlight kernel
-    function; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have the further layers that the
+    `scene`: from `realtime.scene.read_scene.read_scene`; `method`: a real-time method; `kernel`: an airlight
+    kernel; needed where `method.uses_kernel` says so; `extra_layers`: whether frames have the further layers that the
     method names, which puts all lights into one group; never in a scene with area lights; `parameters`: values of the
     method's parameters, and of `realtime.area_lights.points.LightSamples`; the others have their defaults. Raises
     InputError for a parameter that the method does not have, a missing kernel, and a scene that the method refuses;
@@ -166,7 +167,7 @@ def frame_renderer(
         light_samples,
         pixel,
         structures={},
-        kernel=prepare_kernel(kernel, type(scene.camera.origin.x)) if chosen.uses_kernel else None,
+        kernel=kernel.prepared(type(scene.camera.origin.x)) if chosen.uses_kernel and kernel else None,
         extra_layers=extra_layers and not scene.area_lights,
         sphere_scales=sphere_scales(scene, chosen) if "sphere" in scene.features.area_lights else None,
         history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x)) if chosen.history else None,

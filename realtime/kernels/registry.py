@@ -1,38 +1,80 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Airlight kernels: J between two distances along a ray, for a whole array of rays.
 
-A kernel is a function ``kernel(geometry, x0, x1, medium, light, **parameters) -> J [1/m]``. `geometry` is a
-`realtime.rays.RayGeometry`, ``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the
-result has one value per ray for a grey medium, a colour for a coloured one. The in-scattered radiance is ``albedo
-sigma_t intensity J / (4 pi)``. `realtime.scene.media.medium` clips the segment to the cone of a spot before it
-calls the kernel; where the intensity falls off inside the cone (``light.varies``), the kernel weighs its integrand by
-`RayGeometry.falloff`.
+A kernel is a function ``function(geometry, x0, x1, medium, light, **parameters) -> J [1/m]`` in a
+record, `Kernel`, which answers what else media ask of it. `geometry` is a `realtime.rays.RayGeometry`,
+``x0 <= x1`` [m] bound the lit part of the ray (`x1` may be infinite), and the result has one value per
+ray for a grey medium, a colour for a coloured one. The in-scattered radiance is ``albedo sigma_t
+intensity J / (4 pi)``. `realtime.scene.media.medium` clips the segment to the cone of a spot before it
+calls the kernel; where the intensity falls off inside the cone (``light.varies``), the kernel weighs
+its integrand by `RayGeometry.falloff`.
+
+**Tables.** A frozen function cannot take an array from the host, and reads one on the device only if it is among its
+inputs. A kernel that reads tables has a `prepare`; code that freezes a function passes it the kernel that
+`Kernel.prepared` returns as an input.
 
 `KERNELS` is the registry: add a `Kernel` to it and every method, command and report knows it.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 from realtime.kernels.closed_form import closed_form
 from realtime.kernels.exact import exact
 from realtime.kernels.stepping import equiangular, quadrature, quadrature_theta, uniform
-from realtime.kernels.table import table
-from realtime.kernels.taylor import taylor
+from realtime.kernels.table import table, upload_table
+from realtime.kernels.taylor import taylor, taylor_bounded
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel under its name, with what a user must know of it."""
+    """A kernel under its name: what a user must know of it, and what media ask of it."""
 
     name: str
     function: Callable[..., Any]
-    summary: str
-    source: str
-    parameters: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))  #: name -> default
+    summary: str = ""
+    source: str = ""
+    parameters: dict[str, int] = field(default_factory=dict)  #: name -> value; 'name-N' sets the first
+    exact: bool = False  #: right to the precision of the arrays: media may take their best integral in its place
+    in_asinh: bool = False  #: whether its nodes lie in w = asinh(q/h), by which media of any density can integrate
+    #: ``prepare(Float, **parameters) -> tables``, which the function then takes as its keyword `tables`
+    prepare: Callable[..., Any] | None = None
+    #: ``bounded(geometry, x0, x1, light, phase, segment, **parameters) -> J [1/m]``, its form for bounded media:
+    #: `segment` is a `realtime.scene.media.published_form.ConstantLeg`, x0 and x1 bound a segment of any length [m]
+    bounded: Callable[..., Any] | None = None
+    tables: Any = None  #: on the device
+
+    def __call__(self, *arguments):
+        """Return J [1/m] of geometry, x0, x1, medium and light."""
+        tables = {} if self.tables is None else {"tables": self.tables}
+        return self.function(*arguments, **self.parameters, **tables)
+
+    def prepared(self, Float: type) -> "Kernel":
+        """Return the kernel with its tables, evaluated, in the precision of `Float`, the type of a number per ray.
+
+        Raises
+        ------
+        InputError
+            For what the kernel's `prepare` refuses.
+        """
+        return self if self.prepare is None else replace(self, tables=self.prepare(Float, **self.parameters))
+
+    @property
+    def bounded_form(self) -> Callable[..., Any] | None:
+        """The form for bounded media with the kernel's parameters; None for a kernel that has none."""
+        return None if self.bounded is None else partial(self.bounded, **self.parameters)
+
+    @property
+    def asinh_nodes(self) -> int | None:
+        """How many nodes in w = asinh(q/h) it has; None for a kernel of another rule."""
+        return self.parameters["nodes"] if self.in_asinh else None
+
+    def of_size(self, size: int) -> "Kernel":
+        """Return the kernel 'name-N', whose first parameter is the size N."""
+        first = next(iter(self.parameters))
+        return replace(self, name=f"{self.name}-{size}", parameters=self.parameters | {first: size})
 
 
 KERNELS: dict[str, Kernel] = {
@@ -41,55 +83,60 @@ KERNELS: dict[str, Kernel] = {
         exact,
         "the default: nodes placed by the phase function's lobe, accurate to float32",
         "realtime/kernels/exact.py",
+        exact=True,
     ),
     "quadrature": Kernel(
         "quadrature",
         quadrature,
         "Gauss-Legendre nodes in w = asinh(q/h)",
         "the path form of the airlight equation, realtime/kernels/stepping.py",
-        MappingProxyType({"nodes": 16}),
+        {"nodes": 16},
+        in_asinh=True,
     ),
     "taylor": Kernel(
         "taylor",
         taylor,
         "polynomial in the angle theta about the foot, coefficients re-derived",
         "Biri, Arques, Michelin 2006, section 4.1 and annex",
-        MappingProxyType({"degree": 4}),
+        {"degree": 4},
+        bounded=taylor_bounded,
     ),
     "taylor-printed": Kernel(
         "taylor-printed",
         partial(taylor, printed=True),
         "the same with the paper's coefficients as printed, misprints included",
         "Biri, Arques, Michelin 2006, annex as transcribed",
-        MappingProxyType({"degree": 4}),
+        {"degree": 4},
+        bounded=partial(taylor_bounded, printed=True),
     ),
     "quadrature-theta": Kernel(
         "quadrature-theta",
         quadrature_theta,
         "Gauss-Legendre nodes in theta, the angle at the light",
         "Biri, Arques, Michelin 2006, section 4.1 (the angle form)",
-        MappingProxyType({"nodes": 16}),
+        {"nodes": 16},
     ),
     "equiangular": Kernel(
         "equiangular",
         equiangular,
         "midpoint steps in theta",
         "Kulla, Fajardo 2012, section 4",
-        MappingProxyType({"steps": 16}),
+        {"steps": 16},
     ),
     "uniform": Kernel(
         "uniform",
         uniform,
         "midpoint steps in the distance, as in most shaders",
         "Billeter, Sintorn, Assarsson 2010, section 2",
-        MappingProxyType({"steps": 100}),
+        {"steps": 100},
     ),
     "table": Kernel(
         "table",
         table,
         "two reads of F(u, v), bilinear; the edge is read beyond sigma_t h = 10",
         "Sun, Ramamoorthi, Narasimhan, Nayar 2005",
-        MappingProxyType({"size": 64}),
+        {"size": 64},
+        prepare=upload_table,
     ),
     "closed-form": Kernel(
         "closed-form",

@@ -28,7 +28,6 @@ import numpy as np
 from realtime.errors import InputError
 from realtime.numerics.array_types import four_numbers
 from realtime.numerics.functions import cell_of
-from realtime.numerics.recorded import prepared_by
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
@@ -48,7 +47,7 @@ def upload_table(Float, *, size: int = 64):
     if dr.flag(dr.JitFlag.FreezingScope):
         raise InputError(
             "kernel table: got a frozen function that records while the table is not on the device; call "
-            "realtime.numerics.recorded.prepare_kernel before, and pass on what it returns"
+            "Kernel.prepared before, and pass on what it returns"
         )
     records = Float(table_records(size).ravel())
     dr.make_opaque(records)
@@ -60,7 +59,6 @@ def _check(size: int) -> None:
         raise InputError(f"size: got {size!r}, expected a whole number from 2 to {_LARGEST_SIZE}")
 
 
-@prepared_by(upload_table)
 def table(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, size: int = 64, tables=None):
     """Return the airlight integral J as the difference of two reads of a table [1/m].
 

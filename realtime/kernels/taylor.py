@@ -48,7 +48,7 @@ from realtime.numerics.array_types import largest
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
-from realtime.scene.media.published_form import ConstantLeg, bounded_by, tangent_series
+from realtime.scene.media.published_form import ConstantLeg, tangent_series
 from realtime.scene.phase import PHASES, Phase, series_product
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
@@ -88,7 +88,6 @@ def taylor_bounded(
     return _polynomial(geometry, x0, x1, light, coefficients) * dr.exp(-depth) / geometry.height
 
 
-@bounded_by(taylor_bounded)
 def taylor(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4, printed: bool = False):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 

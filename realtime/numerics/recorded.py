@@ -6,18 +6,11 @@ a Mitsuba scene that is collected in the middle ends the process, or the recordi
 
 An exception in the function ends the recording as if the function had returned nothing, and is raised after the
 recording: Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
-
-**Tables of kernels.** A frozen function cannot take an array from the host, and reads one on the device only if it is
-among its inputs. A kernel may therefore have a `prepare`, ``prepare(Float, **parameters) -> tables``, which
-`prepared_by` gives it. Code that freezes a function passes it the kernel that `prepare_kernel` returns as an input. A
-kernel without `prepare` needs none of this.
 """
 
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -85,36 +78,3 @@ def refusals() -> Iterator[None]:
         if isinstance(root, InputError):
             raise root from None
         raise
-
-
-def prepared_by(prepare: Callable[..., Any]) -> Callable[[Any], Any]:
-    """Return a decorator that gives a kernel its `prepare`; the kernel takes the tables as its keyword `tables`."""
-
-    def mark(kernel: Any) -> Any:
-        kernel.prepare = prepare
-        return kernel
-
-    return mark
-
-
-@dataclass(frozen=True)
-class PreparedKernel:
-    """A kernel and the tables that it reads, an input of recorded functions."""
-
-    kernel: Any
-    tables: Any
-
-    def __call__(self, *arguments):
-        """Call the kernel."""
-        return self.kernel(*arguments, tables=self.tables)
-
-
-def prepare_kernel(kernel: Any, Float: type) -> Any:
-    """Return a kernel with its tables, evaluated, in the precision of `Float`; the kernel itself if it reads none.
-
-    `kernel`: a kernel function, or a `functools.partial` of one that sets parameters; `Float`: the type of a number per
-    ray. Raises InputError for what the kernel's `prepare` refuses.
-    """
-    function, parameters = (kernel.func, kernel.keywords) if isinstance(kernel, partial) else (kernel, {})
-    prepare = getattr(function, "prepare", None)
-    return kernel if prepare is None else PreparedKernel(kernel, prepare(Float, **parameters))

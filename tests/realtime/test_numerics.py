@@ -87,7 +87,7 @@ def test_a_frame_whose_objects_move_is_recorded_at_most_twice(variant):
     """
 
     scene = read_scene(load_scene("two-pens", (16, 12)).scene)
-    renderer = frame_renderer(scene, METHODS["unshadowed"], kernel=KERNELS["exact"].function)
+    renderer = frame_renderer(scene, METHODS["unshadowed"], kernel=KERNELS["exact"])
     objects = read_objects(scene, ("pens", "flag"))
     for _ in range(8):
         moved = replace(renderer, scene=turned_objects(scene, objects, np.eye(3)))

@@ -17,9 +17,9 @@ import numpy as np
 
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
-from realtime.kernels.registry import KERNELS
+from realtime.kernels.registry import KERNELS, Kernel
 from realtime.numerics.array_types import aligned_array
-from realtime.numerics.recorded import Frozen, prepare_kernel
+from realtime.numerics.recorded import Frozen
 from realtime.rays import RayGeometry
 from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
@@ -27,7 +27,7 @@ from realtime.scene.phase import named_phase
 from validation.arrays import Counted
 from validation.clock import time_repeated, timing_of
 from validation.kernels.case_files import Cases
-from validation.kernels.cases import TABLE, Kernel
+from validation.kernels.cases import TABLE
 from validation.kernels.errors import errors_by_group
 from validation.kernels.rays import wide_rays
 from validation.kernels.records import ErrorLevel, KernelCost, RayTime
@@ -77,14 +77,14 @@ def bench_kernels(
 def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, seconds: float = 0.3) -> KernelCost:
     """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function."""
     name, phase, g = sized(family, size), reference.phase[0], float(reference.g[0])
-    function = find_kernel(name)
+    kernel = find_kernel(name)
     cost = KernelCost(kernel=name, family=family, size=size, phase=phase, g=g)
     rays = len(timed.x0)
     if size is not None and family in KERNELS and next(iter(KERNELS[family].parameters), None) == "steps":
         rays //= max(1, size // _MOST_STEPS)
     try:
-        J = np.array(_frozen(function, reference)(), dtype=np.float64)
-        device, wall = times_per_ray(_frozen(function, timed, rays), rays, seconds)
+        J = np.array(_frozen(kernel, reference)(), dtype=np.float64)
+        device, wall = times_per_ray(_frozen(kernel, timed, rays), rays, seconds)
     except (InputError, RealtimeInputError) as reason:
         return replace(cost, refused=str(reason))
     error = errors_by_group(reference, J, "single", {"all": np.ones(len(J), dtype=bool)})["all"]
@@ -131,7 +131,7 @@ def _ladder(name: str) -> tuple[str, int | None, tuple[int | None, ...]]:
     return record.name, default, tuple(sorted({size for size in (*known, default) if size > 0}))
 
 
-def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], Any]:
+def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[], Any]:
     """Return work that evaluates a kernel on rays that lie on the device, frozen after its first call."""
     part = slice(0, rays)
     name = cases.phase[0]
@@ -146,7 +146,7 @@ def _frozen(function: Kernel, cases: Cases, rays: int | None = None) -> Callable
     foot, height, x0, x1 = (aligned_array(mi.Float, column[part]) for column in columns)
     geometry = RayGeometry(foot, height, None, None)
     dr.eval(geometry.foot, geometry.height, x0, x1)
-    kernel = prepare_kernel(function, mi.Float)
+    kernel = kernel.prepared(mi.Float)
     # Once outside: what a kernel refuses must not be raised while it is recorded.
     dr.eval(kernel(geometry, x0, x1, medium, light))
     replay = Frozen(lambda kernel, *case: kernel(*case))

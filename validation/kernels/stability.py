@@ -8,11 +8,11 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from realtime.kernels.registry import KERNELS
+from realtime.kernels.registry import KERNELS, Kernel
 from validation.arrays import Array, Bools, Counted
 from validation.certified.files import certified_data
 from validation.kernels.case_files import Cases, read_cases
-from validation.kernels.cases import Kernel, evaluate_accepted
+from validation.kernels.cases import evaluate_accepted
 from validation.kernels.errors import errors_by_group, groups
 from validation.kernels.rays import hard_rays
 from validation.kernels.records import Rays, Stability
@@ -39,38 +39,32 @@ def stability(
     names: Sequence[str] | None = None, *, count: int = 100_000, progress: Counted | None = None
 ) -> list[Stability]:
     """Study kernels, all of the registry by default, on the certified rays and on so many generated ones."""
-    chosen = [(name, find_kernel(name)) for name in names or KERNELS]  # refuse a wrong name before any work
+    chosen = [find_kernel(name) for name in names or KERNELS]  # refuse a wrong name before any work
     sets = {name: read_cases(certified_data(name)) for name in CERTIFIED} | {GENERATED: hard_rays(count)}
     results = []
-    for number, (name, function) in enumerate(chosen):
+    for number, kernel in enumerate(chosen):
         if progress is not None:
-            progress(number, len(chosen), name)
-        results.append(kernel_stability(name, function, sets))
+            progress(number, len(chosen), kernel.name)
+        results.append(kernel_stability(kernel, sets))
     return results
 
 
-def kernel_stability(name: str, function: Kernel, sets: dict[str, Cases]) -> Stability:
+def kernel_stability(kernel: Kernel, sets: dict[str, Cases]) -> Stability:
     """Study one kernel on sets of rays with known J, the generated ones among them."""
-    exact = claims_exact(name)
     broken: list[str] = []
     studied = []
     refused: dict[str, str] = {}
     for label, cases in sets.items():
         values: dict[str, Array] = {}
         for each in PRECISIONS:
-            values[each], reasons = evaluate_accepted(cases, function, each)
+            values[each], reasons = evaluate_accepted(cases, kernel, each)
             refused |= {phase: str(reason) for phase, reason in reasons.items()}
         rows = groups(cases)
         errors = {each: errors_by_group(cases, values[each], each, rows, refused) for each in PRECISIONS}
         studied.append(Rays(name=label, columns=",".join(cases.header), **errors))
-        if exact:
+        if kernel.exact:
             broken += _broken(label, cases, values, refused)
-    return Stability(kernel=name, exact=exact, refused=refused, sets=tuple(studied), broken=tuple(broken))
-
-
-def claims_exact(name: str) -> bool:
-    """Return whether a kernel claims to be exact: by its name or by a field `exact` in the registry."""
-    return name == "exact" or bool(getattr(KERNELS.get(name), "exact", False))
+    return Stability(kernel=kernel.name, exact=kernel.exact, refused=refused, sets=tuple(studied), broken=tuple(broken))
 
 
 def _broken(name: str, cases: Cases, values: dict[str, Array], refused: Collection[str] = ()) -> list[str]:

@@ -10,7 +10,7 @@ import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial, wraps
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -154,8 +154,8 @@ def _function_name(function: Callable[..., Any]) -> str:
     return name
 
 
-def find_kernel(name: str) -> Callable[..., Any]:
-    """Return the kernel function of a name.
+def find_kernel(name: str) -> Kernel:
+    """Return the kernel of a name.
 
     The name is one of `realtime.kernels.registry.KERNELS`, 'name-N' for the same kernel with its first parameter
     set to the whole number N, or a user's, 'module:function' or 'path/to/file.py:function'. An unknown one is
@@ -164,9 +164,7 @@ def find_kernel(name: str) -> Callable[..., Any]:
     if ":" in name:
         return _imported(name)
     record, size = split_name(name)
-    if size is None:
-        return record.function
-    return partial(record.function, **{next(iter(record.parameters)): size})
+    return record if size is None else record.of_size(size)
 
 
 def split_name(name: str) -> tuple[Kernel, int | None]:
@@ -190,20 +188,20 @@ def sized(name: str, size: int | None) -> str:
     return name if size is None else f"{name}-{size}"
 
 
-def _imported(name: str) -> Callable[..., Any]:
+def _imported(name: str) -> Kernel:
     try:
-        kernel = user_object(name, "kernel")
+        function = user_object(name, "kernel")
     except MethodError as error:
         raise InputError(str(error)) from error
-    if not callable(kernel):
-        raise InputError(f"kernel {name}: it is a {type(kernel).__name__}; expected a function")
+    if not callable(function):
+        raise InputError(f"kernel {name}: it is a {type(function).__name__}; expected a function")
 
-    @wraps(kernel)
-    def guarded(*arguments: Any, **parameters: Any) -> Any:
+    @wraps(function)
+    def guarded(*arguments: Any) -> Any:
         with user_errors(f"kernel {name}"):
-            return kernel(*arguments, **parameters)
+            return function(*arguments)
 
-    return guarded
+    return Kernel(name, guarded)
 
 
 def user_code(chosen: Configuration) -> list[str]:

@@ -18,7 +18,7 @@ from realtime.scene.density import Density
 from realtime.scene.media.bounded_rays import BoundedRays, camera_pieces, check_form
 from realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
 from realtime.scene.media.medium import Homogeneous
-from realtime.scene.media.published_form import bounded_form
+from realtime.scene.media.published_form import ConstantLeg
 from realtime.scene.phase import Phase
 
 
@@ -155,7 +155,7 @@ class BoundedMedia(Homogeneous):
         """
         if not self.bounded_media:  # what clouds fill is for their methods
             return super().lit(rays, light, geometry, kernel=kernel)
-        polynomial = bounded_form(kernel)
+        polynomial = kernel.bounded_form if kernel is not None else None
         if form == "kernel":
             form = "exact" if polynomial is None or not light.w else "paper"
             if form != "exact" and not self.clear:
@@ -171,6 +171,6 @@ class BoundedMedia(Homogeneous):
         # A polynomial must refuse here, not in a branch. Dr.Jit computes nothing that nobody reads.
         zero = type(geometry.height)(0)
         for own in self.bounded_media:
-            segment = own.medium.sigma_t[0], zero, own.mean_distance, form == "printed"
+            segment = ConstantLeg(own.medium.sigma_t[0], zero, own.mean_distance, form == "printed")
             polynomial(geometry, zero, zero, light, own.medium.phase, segment)
         return BoundedRays(self, light, rays, geometry, kernel, pieces, form, polynomial)

@@ -64,6 +64,7 @@ from realtime.numerics.functions import exp_bounded, summed, unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
 from realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach
+from realtime.scene.media.published_form import ConstantLeg
 from realtime.scene.rule_reach import TANGENT, TURN_DEPTH, TURN_NODES, angle_scale
 
 FORMS = ("exact", "paper", "printed")
@@ -90,9 +91,7 @@ class BoundedRays(LitRays):
 
     pieces: tuple[Piece, ...] = ()
     form: str = "exact"  #: of `FORMS`
-    #: For the published forms what takes the place of panels, or None: a function (geometry, x0, x1, light, phase,
-    #: (sigma_t, depth, R, printed)) -> J, see `realtime.scene.media.published_form`.
-    polynomial: Any = None
+    polynomial: Any = None  #: for the published forms what takes the place of panels: `Kernel.bounded_form`, or None
 
     def airlight(self, x0, x1):
         """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1] [m], RGB [1/m^2], from infinity [1].
@@ -330,8 +329,8 @@ def _published_sum(ray: BoundedRays, piece: Piece, x0, x1):
         channels = []
         for before, sigma in zip(piece.before, piece.medium.sigma_t):
             depth = dr.fma(sigma, distance - piece.begin, before)
-            constants = sigma, depth, distance, ray.form == "printed"
-            channels.append(sigma * ray.polynomial(ray.geometry, x0, x1, ray.light, piece.medium.phase, constants))
+            segment = ConstantLeg(sigma, depth, distance, ray.form == "printed")
+            channels.append(sigma * ray.polynomial(ray.geometry, x0, x1, ray.light, piece.medium.phase, segment))
         return piece.medium.albedo * Color(*channels)
 
     segments = ray.geometry.smooth_subsegments(ray.light, x0, x1)

@@ -149,14 +149,12 @@ class HeightFog(VaryingMedium):
         """
         if form not in ("kernel", "exact"):
             raise InputError(f"media={form}: the published approximation is of bounded media; use media=exact")
-        named = getattr(kernel, "func", kernel)
-        name = getattr(named, "__name__", "exact") if kernel is not None else "exact"
-        if light.w and name not in ("exact", "quadrature"):
+        nodes = None if kernel is None or kernel.exact else kernel.asinh_nodes
+        if light.w and not (kernel is None or kernel.exact or nodes is not None):
             raise InputError(
-                f"kernel: got {name}, which is of homogeneous fog; expected exact, or quadrature with its nodes, in "
-                "height fog"
+                f"kernel: got {kernel.name}, which is of homogeneous fog; expected exact, or quadrature with its "
+                "nodes, in height fog"
             )
-        nodes = getattr(kernel, "keywords", {}).get("nodes", 16) if name == "quadrature" else None
         return HeightRays(self, light, rays, geometry, kernel, nodes)
 
     def _fall(self, layer: Layer, z):

@@ -17,13 +17,11 @@ sigma_t h, b = sigma_t R and the angle theta at the light,
   a^4/24 + a^2/3, ...
 * printed, the coefficients of the medium without bounds, c_n(sigma_t, h), become c_n(sigma_t, R).
 
-A kernel that has this form carries it as its attribute `bounded`, which `bounded_by` gives it. Other kernels leave
-bounded media to nodes, with the true depth of both segments.
+A kernel that has this form answers with it as `Kernel.bounded`. Other kernels leave bounded media to nodes, with the
+true depth of both segments.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 
@@ -35,32 +33,6 @@ class ConstantLeg:
     depth: Any  #: optical depth before the medium, and sigma_t (R - x_n) [1]
     distance: Any  #: R [m]
     printed: bool  #: whether the exponent is the printed one
-
-
-def bounded_by(bounded: Callable[..., Any]) -> Callable[[Any], Any]:
-    """Return a decorator that gives a kernel its form for bounded media.
-
-    That is a function ``bounded(geometry, x0, x1, light, phase, segment, **parameters) -> J [1/m]`` with `segment` a
-    `ConstantLeg` and the parameters of the kernel; `x0` and `x1` bound a segment of any length [m].
-    """
-
-    def mark(kernel: Any) -> Any:
-        kernel.bounded = bounded
-        return kernel
-
-    return mark
-
-
-def bounded_form(kernel: Any) -> Callable[..., Any] | None:
-    """Return the form of a kernel for bounded media, with its parameters set; None for one that has none."""
-    function, parameters = (kernel.func, kernel.keywords) if isinstance(kernel, partial) else (kernel, {})
-    bounded = getattr(function, "bounded", None)
-    known = {name: value for name, value in parameters.items() if name != "tables"}
-    if bounded is None:
-        return None
-    return lambda geometry, x0, x1, light, phase, segment: bounded(
-        geometry, x0, x1, light, phase, ConstantLeg(*segment), **known
-    )
 
 
 def tangent_series(a: Any, degree: int) -> list[Any]:

@@ -131,7 +131,7 @@ def frame(method, parameters, size=(96, 72)):
     chosen = METHODS[method]
     turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 40).scale(0.33)
     scene = read_scene(mi.load_dict(tiny_scene(size=size, ball={"type": "cube", "to_world": turned})))
-    kernel = KERNELS["exact"].function
+    kernel = KERNELS["exact"]
     return render_frame(frame_renderer(scene, chosen, kernel=kernel, **parameters))
 
 

@@ -38,7 +38,7 @@ STEPS = ("light", "medium", "colour", "camera", "light", "objects", "colour", "l
 
 
 def made(scene: Scene, method: str, **parameters) -> FrameRenderer:
-    kernel = KERNELS["taylor"].function
+    kernel = KERNELS["taylor"]
     return frame_renderer(scene, METHODS[method], kernel=kernel, **parameters)
 
 
@@ -182,9 +182,7 @@ def scene_of_parts(*, lamp=False):
 
 def renderer_of_parts(name):
     method = METHODS[name.partition(",")[0]]
-    return frame_renderer(
-        scene_of_parts(lamp="disk" in name), method, kernel=KERNELS["exact"].function, **IN_PARTS[name]
-    )
+    return frame_renderer(scene_of_parts(lamp="disk" in name), method, kernel=KERNELS["exact"], **IN_PARTS[name])
 
 
 def same(frame, other):

@@ -64,9 +64,7 @@ def test_every_method_renders_the_points_of_a_light(variant, one_by_one, name):
 def test_a_folded_lamp_alone_shadows_itself_and_another_does_not(variant):
     """A speck far behind the camera, which makes any scene one with shadows, changes nothing."""
     speck = {"type": "sphere", "center": [3.0, 1.0, -500.0], "radius": 1e-3}
-    alone, beside = (
-        read(lit_scene(size=(8, 6), lamp=ring(), **more)) for more in ({}, {"speck": speck})
-    )
+    alone, beside = (read(lit_scene(size=(8, 6), lamp=ring(), **more)) for more in ({}, {"speck": speck}))
     airlight, expected = (render(scene, "ray-march", points=2, steps=50).airlight for scene in (alone, beside))
     np.testing.assert_allclose(airlight, expected, rtol=1e-5)
     assert not read(lit_scene(lamp=lamp("sphere", center=[0.3, 0.4, 2.9]))).features.shadows

@@ -165,7 +165,7 @@ def waits_of_frames(scene: dict[str, Any], method: str) -> dict[str, Counter[str
     """By what moved, the waits of a frame that has been rendered before."""
     read = read_scene(mi.load_dict(scene))
     points = {"points": POINTS} if read.area_lights else {}
-    renderer = frame_renderer(read, METHODS[method], kernel=KERNELS["exact"].function, **points)
+    renderer = frame_renderer(read, METHODS[method], kernel=KERNELS["exact"], **points)
     cache, waits = None, {}
     for counting in (False, True):
         for name, moved in MOVES.items():

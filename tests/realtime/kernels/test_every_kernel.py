@@ -90,4 +90,4 @@ def test_a_refusal_from_the_body_of_a_loop_stays_one(variant, method):
     block = {"type": "cube", "to_world": mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.31)}
     scene = read_scene(mi.load_dict(entries | {"fog": fog, "ball": block}))
     with pytest.raises(InputError, match="no Taylor series"):
-        render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["taylor"].function))
+        render_frame(frame_renderer(scene, METHODS[method], kernel=KERNELS["taylor"]))

@@ -12,7 +12,7 @@ from realtime.clouds.canonical.coordinates import OPACITY
 from realtime.errors import InputError
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import frame_renderer, image_frame, render_frame
-from realtime.kernels.exact import exact
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.animate import thicker_medium
 from realtime.scene.camera import ray_directions
@@ -152,7 +152,7 @@ def test_what_is_not_lit_from_infinity_is_refused():
 @pytest.mark.parametrize("name", FOG_METHODS)
 def test_methods_for_fog_refuse_clouds_and_skies_and_name_who_takes_them(name):
     method = METHODS[name]
-    kernel = {"kernel": exact} if method().uses_kernel else {}
+    kernel = {"kernel": KERNELS["exact"]} if method().uses_kernel else {}
     wanted = rf"method {name}: .*use cloud-collectors or cloud-octaves"
     with pytest.raises(InputError, match=wanted):
         frame_renderer(read_scene(loaded()), method, **kernel)

@@ -6,7 +6,7 @@ import pytest
 
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.exact import exact
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
@@ -71,7 +71,9 @@ def test_one_colour_is_the_airlight_of_thin_fog_that_scatters_evenly(scene):
         return text.replace('<phase type="hg"><float name="g" value="0.35"/></phase>', even)
 
     loaded = scene(SUN, change=thin)
-    np.testing.assert_allclose(shown(loaded, "wenzel").airlight, shown(loaded, "airlight", exact).airlight, rtol=5e-3)
+    np.testing.assert_allclose(
+        shown(loaded, "wenzel").airlight, shown(loaded, "airlight", KERNELS["exact"]).airlight, rtol=5e-3
+    )
 
 
 @pytest.mark.claim("fog-colours", tolerance="by name")

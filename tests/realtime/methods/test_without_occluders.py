@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from realtime.frame.renderer import frame_renderer, run_cast_and_shade, run_method, run_stages
-from realtime.kernels.exact import exact
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.lamps import lamp
@@ -33,7 +33,7 @@ def empty(variant):
 def rendered(scene, method, points):
     """Return the airlight as an image, and how many operations the largest kernel of the method has."""
     parameters = SETTINGS.get(method.name, {}) | {"points": points, "pattern": "sobol"}
-    renderer = frame_renderer(scene, method, kernel=exact, **parameters)
+    renderer = frame_renderer(scene, method, kernel=KERNELS["exact"], **parameters)
     state = renderer.prepare(renderer.scene)
     cast, by_light = run_cast_and_shade(renderer)
     dr.kernel_history_clear()

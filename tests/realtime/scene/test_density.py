@@ -7,7 +7,7 @@ import pytest
 
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer
-from realtime.kernels.exact import exact
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.closed_mesh import closed_mesh, encloses
 from realtime.scene.density import density_at
@@ -99,7 +99,7 @@ def test_what_is_no_density_is_refused_by_name(medium, words):
 def test_methods_for_fog_refuse_a_density_and_name_those_for_clouds(name):
     convex = placed(box((50.0, 60.0, 70.0)), (3.0, 1.0, 2.0))
     read = read_scene(mi.load_dict(cloud_scene(sun=SUN, box=cloud("box", convex, dense(ROUGH, LOW, HIGH)))))
-    kernel = {"kernel": exact} if METHODS[name]().uses_kernel else {}
+    kernel = {"kernel": KERNELS["exact"]} if METHODS[name]().uses_kernel else {}
     with pytest.raises(InputError, match=r"heterogeneous medium.*cloud-collectors or cloud-octaves") as refusal:
         frame_renderer(read, METHODS[name], **kernel)
     assert "\n" not in str(refusal.value)

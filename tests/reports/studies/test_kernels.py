@@ -3,6 +3,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,7 +89,7 @@ def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys)
 
     monkeypatch.setattr("reports.studies.kernels._TRIED_RAYS", 64)
     assert airlight.study("stability", kernel="taylor").passed
-    monkeypatch.setitem(KERNELS, "exact", KERNELS["taylor"])
+    monkeypatch.setitem(KERNELS, "exact", replace(KERNELS["taylor"], name="exact", exact=True))
     assert cli.run(["study", "stability", "--kernel", "exact"]) == 1
     assert "BROKEN: exact, airlight_integral.csv: float32 maximum" in capsys.readouterr().out
 

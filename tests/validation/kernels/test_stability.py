@@ -11,6 +11,7 @@ import pytest
 from analytic.errors import InputError
 from analytic.phase import PHASE_NAMES, PhaseFunction
 from realtime.errors import InputError as RealtimeInputError
+from realtime.kernels.registry import Kernel
 from realtime.kernels.stepping import quadrature
 from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.kernel_values import take
@@ -31,8 +32,8 @@ def isotropic(cases):
     return take(cases, np.array(cases.phase) == "isotropic")
 
 
-def study(function, name="own:kernel"):
-    return kernel_stability(name, function, {GENERATED: isotropic(hard_rays(256))})
+def study(function, *, exact=False):
+    return kernel_stability(Kernel("own:kernel", function, exact=exact), {GENERATED: isotropic(hard_rays(256))})
 
 
 def four_rays():
@@ -88,7 +89,7 @@ def test_small_relative_mistake_is_found_where_it_is(variant):
 
 @pytest.mark.claim("exact-keeps-its-bar")
 def test_kernel_that_claims_to_be_exact_is_held_to_it(variant):
-    verdict = study(gauss, "exact")
+    verdict = study(gauss, exact=True)
     assert verdict.exact
     assert any("float32 maximum, |g| up to 0.9" in words and "isotropic" in words for words in verdict.broken)
     assert any("float64 maximum" in words for words in verdict.broken)
@@ -100,7 +101,7 @@ def test_negative_and_missing_values_break_the_claim(variant):
         J = gauss(geometry, x0, x1, medium, light)
         return dr.select(geometry.foot < 0, -J, dr.select(x0 > 0, dr.nan, J))
 
-    words = study(bad, "exact").broken
+    words = study(bad, exact=True).broken
     for precision in ("float32", "float64"):
         assert any(precision in sentence and "negative" in sentence for sentence in words)
         assert any(precision in sentence and "NaN" in sentence for sentence in words)

@@ -96,9 +96,9 @@ def own_module(tmp_path):
 
 def test_number_behind_a_name_sets_the_first_parameter():
     kernel = find_kernel("quadrature-24")
-    assert kernel.func is quadrature
-    assert kernel.keywords == {"nodes": 24}
-    assert find_kernel("taylor-6").keywords == {"degree": 6}
+    assert kernel.function is quadrature
+    assert kernel.parameters == {"nodes": 24}
+    assert find_kernel("taylor-6").parameters == {"degree": 6}
     # The longest name of the registry wins: 'quadrature-theta-8' is no 'quadrature' of size 'theta-8'.
     assert split_name("quadrature-theta-8") == (KERNELS["quadrature-theta"], 8)
 

@@ -6,7 +6,7 @@ import pytest
 
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.exact import exact
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
@@ -70,6 +70,6 @@ def test_methods_of_lit_segments_and_turned_boxes_are_refused(scene):
         with pytest.raises(
             InputError, match=r"the medium is a density grid.*use froxel-fog, soft-shafts, or ray-march"
         ):
-            frame_renderer(read, METHODS[name], kernel=exact)
+            frame_renderer(read, METHODS[name], kernel=KERNELS["exact"])
     with pytest.raises(InputError, match="turned or mirrored"):
         read_scene(scene(LAMP, turn='<rotate z="1" angle="30"/>'))

@@ -2,7 +2,6 @@
 """Height fog on the device: the certified rays in both precisions, frames against the reference, and refusals."""
 
 from dataclasses import replace
-from functools import partial
 
 import mitsuba as mi
 import numpy as np
@@ -16,9 +15,7 @@ from analytic.height_fog import height_fog_segments
 from analytic.phase import PhaseFunction
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.exact import exact
-from realtime.kernels.stepping import quadrature
-from realtime.kernels.taylor import taylor
+from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import METHODS
 from realtime.numerics.array_types import array_types
 from realtime.rays import ray_geometry
@@ -31,6 +28,7 @@ from reference.scene.read import read_reference
 from tests.helpers.frames import relative_rmse
 from tests.helpers.height_fog import LAMP, SPOT, SUN, Row, fog_xml, rows
 from validation.scenes.loading import load_scene
+from validation.study.configuration import find_kernel
 
 
 def ends_of(row):
@@ -43,7 +41,7 @@ def ends_of(row):
     return min(floor, *heights) - 1, max(cap, *heights) + 1
 
 
-def relative_errors(chosen, precision, kernel=exact):
+def relative_errors(chosen, precision, kernel=KERNELS["exact"]):
     """The relative errors of rows of one kind, in one call of the medium."""
     types = array_types(precision)
 
@@ -138,9 +136,9 @@ def test_no_panel_misses_a_layer(variant, clamped):
 
 @pytest.mark.claim("height-fog-kernels", tolerance="1e-4 for nine of ten generic rays, as asked for")
 def test_sixteen_nodes_in_w(variant):
-    errors = relative_errors(by_tag(*GENERIC), "single", quadrature)
+    errors = relative_errors(by_tag(*GENERIC), "single", KERNELS["quadrature"])
     assert np.quantile(errors, 0.9) < 1e-5
-    assert np.quantile(relative_errors(by_tag(*GENERIC), "double", partial(quadrature, nodes=8)), 0.9) < 1e-5
+    assert np.quantile(relative_errors(by_tag(*GENERIC), "double", find_kernel("quadrature-8")), 0.9) < 1e-5
 
 
 def test_phi_keeps_its_digits(variant):
@@ -161,8 +159,8 @@ def scene(variant, tmp_path):
     return load
 
 
-def frame(scene, method, kernel=exact, **parameters):
-    return render_frame(frame_renderer(read_scene(scene), METHODS[method], kernel=kernel, **parameters))
+def frame(scene, method, kernel="exact", **parameters):
+    return render_frame(frame_renderer(read_scene(scene), METHODS[method], kernel=find_kernel(kernel), **parameters))
 
 
 @pytest.mark.claim("height-fog-methods", tolerance="1e-5 relative RMSE of shadow planes in float32")
@@ -205,9 +203,16 @@ def test_built_in_scenes(variant, name):
     assert relative_rmse(frame(loaded, "shadow-planes").airlight, reference.airlight) < 1e-5
 
 
+@pytest.mark.parametrize("name", [*sorted(set(KERNELS) - {"exact", "quadrature"}), "math:fsum"])
+def test_no_image_has_the_name_of_a_kernel_that_height_fog_did_not_ask(variant, name):
+    kernel = find_kernel(name).prepared(array_types("single").scalar)
+    with pytest.raises(InputError, match=f"kernel: got {name}, which is of homogeneous fog"):
+        relative_errors(by_tag("generic")[:2], "single", kernel)
+
+
 @pytest.mark.claim("height-fog-refused", tolerance="by name")
 def test_refusals(scene):
     with pytest.raises(InputError, match="kernel: got taylor, which is of homogeneous fog"):
-        frame(scene(LAMP), "shadow-planes", taylor)
+        frame(scene(LAMP), "shadow-planes", "taylor")
     with pytest.raises(InputError, match="light 'sun' is directional and shines from the horizon or below"):
         read_scene(scene(SUN.replace('z="-0.45"', 'z="0.1"')))
