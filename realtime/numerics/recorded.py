@@ -4,11 +4,14 @@
 While Dr.Jit records a function, no memory of the device may be freed, and no object may vanish that virtual calls use:
 a Mitsuba scene that is collected in the middle ends the process, or the recording fails. Garbage is collected later.
 
-An exception in the function ends the recording as if the function had returned nothing, and is raised after the
-recording: Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
+The collector is one for all threads of the process, so it pauses until the last of several calls has returned.
+
+An exception in the function, an interrupt by the user among them, ends the recording as if the function had returned
+nothing, and is raised after the recording: Dr.Jit 1.5 answers an exception in a recording by aborting a later one.
 """
 
 import gc
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -18,18 +21,42 @@ import drjit as dr
 from realtime.errors import InputError, root_of
 
 
+class _CollectorPause:
+    """A context in which no garbage is collected; of contexts that overlap, the last one ends the pause."""
+
+    def __init__(self) -> None:
+        self._lock, self._contexts, self._enabled = threading.Lock(), 0, False
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._contexts == 0:
+                self._enabled = gc.isenabled()
+                gc.disable()
+            self._contexts += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._contexts -= 1
+            if self._contexts == 0 and self._enabled:
+                gc.enable()
+
+
+_PAUSE = _CollectorPause()  # one, as the collector is
+
+
 class Frozen:
     """A function frozen by `drjit.freeze`, during whose calls nothing is collected."""
 
     def __init__(self, function: Callable[..., Any], **options):
         # Not an attribute: a function that held this object would be collected at any moment, with the scenes it holds.
-        raised: list[Exception] = []
+        raised = threading.local()  # another thread may call the function meanwhile
 
         def recorded(*args):
             try:
                 return function(*args)
-            except Exception as error:  # of any kind: `__call__` raises it when the recording has ended
-                raised.append(_without_frames(error))
+            except BaseException as error:  # of any kind: `__call__` raises it when the recording has ended
+                interrupt = root_of(error)  # Dr.Jit wraps what is raised in the body of a loop or a branch
+                raised.error = _without_frames(interrupt if isinstance(interrupt, KeyboardInterrupt) else error)
                 return None
 
         self._raised = raised
@@ -37,16 +64,13 @@ class Frozen:
 
     def __call__(self, *args):
         """Call the function: the first time it is recorded, then replayed."""
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
+        self._raised.error = None
+        with _PAUSE:
             result = self._recorded(*args)
-        finally:
-            if enabled:
-                gc.enable()
-        if self._raised:
+        error, self._raised.error = self._raised.error, None
+        if error is not None:
             self._recorded.clear()
-            raise self._raised.pop()
+            raise error
         return result
 
     @property
@@ -55,7 +79,7 @@ class Frozen:
         return self._recorded.n_recordings
 
 
-def _without_frames(error: Exception) -> Exception:
+def _without_frames(error: BaseException) -> BaseException:
     """Return an exception whose causes hold no frames: their arrays must not outlive the recording."""
     links: list[BaseException | None] = [error]
     seen = set()  # Dr.Jit may wrap an exception in one that has the first as its context: a circle

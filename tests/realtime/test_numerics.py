@@ -2,6 +2,7 @@
 """Bounded functions keep the errors that their docstrings state; what is recorded is recorded once, and ends well."""
 
 import gc
+import threading
 from dataclasses import replace
 
 import drjit as dr
@@ -66,6 +67,55 @@ def test_nothing_is_collected_during_a_call(variant, collecting):
     # Names that the function takes from its surroundings are inputs: the list changes, and it is recorded again.
     assert seen == [False] * function.n_recordings
     assert seen
+
+
+def test_nothing_is_collected_until_the_last_of_two_threads_is_done(variant, collecting):
+    """The collector is one for all threads: the first to return must not switch it on under the second."""
+    entered, ends, enabled = threading.Event(), threading.Event(), []
+
+    def first(x):
+        entered.set()
+        assert ends.wait(30)
+
+    def second(x):
+        ends.set()
+        thread.join()
+        enabled.append(gc.isenabled())
+
+    thread = threading.Thread(target=_call, args=(first,))
+    thread.start()
+    assert entered.wait(30)
+    _call(second)
+    assert enabled == [False]
+
+
+def _call(function):
+    """Call a function as `Frozen` does, without Dr.Jit, which has one recording at a time."""
+    frozen = Frozen(function)
+    frozen._recorded = function
+    frozen(1)
+
+
+@pytest.mark.parametrize("in_loop", [False, True])
+def test_an_interrupt_in_a_recording_is_raised_after_it(variant, in_loop):
+    """Dr.Jit answers an exception in a recording by aborting a later one: a notebook's kernel died."""
+    interrupts = [KeyboardInterrupt()]
+
+    def raised(x):
+        if interrupts:
+            raise interrupts.pop()
+        return 2 * x
+
+    def recorded(x):
+        if not in_loop:
+            return raised(x)
+        return dr.while_loop((mi.UInt32(0), x), lambda i, x: i < 1, lambda i, x: (i + 1, raised(x)))[1]
+
+    function, argument = Frozen(recorded), dr.opaque(mi.Float, 1.0, 5)
+    with pytest.raises(KeyboardInterrupt):
+        function(argument)
+    assert float(function(argument)[0]) == 2
+    assert function.n_recordings == 1
 
 
 def test_an_exception_whose_causes_form_a_circle_is_raised(variant):
