@@ -9,6 +9,7 @@ Rooms:
 
 - `errors.py`: the exception for mistakes of the user;
 - `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
+- `transforms.py`: transforms of Mitsuba's plugins, and which of them lights and spheres cannot have;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;
 - `numerics/`: array types, fast functions, Gauss-Legendre nodes;
 - `droplets.py`: phase functions of the droplets of fog and clouds;

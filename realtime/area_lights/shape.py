@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
+from realtime.transforms import host_matrix, turned_outwards
 
 Array = NDArray[np.float64]
 
@@ -147,7 +148,7 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
         raise InputError(f"light '{name}': its shape bounds a medium; expected a light apart from the bounds of media")
     if kind is None:
         return _read_mesh(shape, radiance, opaque)
-    matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    matrix = host_matrix(mi.traverse(shape)["to_world"])
     if not np.isfinite(matrix).all():
         raise InputError(f"light '{name}': its to_world holds numbers that are not finite")
     across, up, third = matrix[:3, 0], matrix[:3, 1], matrix[:3, 2]
@@ -165,7 +166,7 @@ def read_area_light(shape: Any, camera: Array) -> AreaLight:
     if kind == "sphere":
         # Mitsuba 3.9.1 does not turn the normals that it samples on a sphere with the sphere.
         if shape.has_flipped_normals():
-            raise InputError(f"light '{name}': the sphere shines inwards; remove flip_normals")
+            raise InputError(f"light '{name}': the sphere shines inwards; {turned_outwards(shape)}")
         if np.linalg.norm(camera - middle) <= sizes[0]:
             raise InputError(f"light '{name}': the camera is inside of the sphere; move the camera or the light")
     elif np.array(shape.sample_position(0.0, mi.Point2f(0.31, 0.47)).n, dtype=np.float64).ravel() @ normal < 0:

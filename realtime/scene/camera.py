@@ -26,6 +26,7 @@ import numpy as np
 
 from realtime.errors import InputError
 from realtime.numerics.array_types import ArrayTypes, host_numbers
+from realtime.transforms import host_matrix
 
 TILE = 16  #: rays in a tile of neighbouring pixels
 SIDE = 4  #: of a tile [pixels]
@@ -119,7 +120,7 @@ def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
         raise InputError("the camera's film is cropped; remove crop_width, crop_height and crop_offset from the film")
     if any(float(parameters[f"principal_point_offset_{axis}"][0]) for axis in "xy"):
         raise InputError("the camera has a principal point offset; remove principal_point_offset_x and _y")
-    matrix = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    matrix = host_matrix(sensor.world_transform())
     tangent = math.tan(0.5 * math.radians(float(parameters["x_fov"][0])))
     pixel = 2 * tangent / width
     basis = matrix[:3, 2], matrix[:3, 0] * pixel, matrix[:3, 1] * pixel

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from realtime.errors import InputError
 from realtime.scene.mesh_adjacency import mesh_triangles
+from realtime.transforms import turned_outwards
 
 Array = NDArray[np.float64]
 
@@ -151,7 +152,7 @@ def _read_sphere(shape) -> Bounds:
     if np.ptp(size) > FLAT * size.max():
         raise _refusal(shape.id(), "is a sphere with different scales along its axes", "one scale, or a mesh")
     if shape.has_flipped_normals():
-        raise _refusal(shape.id(), "is inside out", "normals that point outwards: remove flip_normals")
+        raise _refusal(shape.id(), "is inside out", f"normals that point outwards: {turned_outwards(shape)}")
     return Bounds(
         shape.id(), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3, 3)), 0.5 * (low + high), float(size.mean() / 2)
     )

@@ -16,7 +16,7 @@ that is linear between voxels.
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 
 _POINTS = 512  # at which a grid is compared with Mitsuba's
 _DIFFERENCE = 2e-3  # from it, of the largest value: a grid read well differs by rounding, 1e-4 where voxels are noise
+_TURNED = 1e-5  # of the grid, by which float32 leaves its sides beside the axes
 _BEYOND = 1e-4  # how far a hull may reach beyond its grid, as a fraction of that
 
 
@@ -152,6 +153,27 @@ def read_density(medium: Any, name: str) -> DensityGrid:
     grid = DensityGrid((values / largest).astype(np.float32), largest * scale, _transform(medium))
     _compare(name, medium, grid)
     return grid
+
+
+def along_the_axes(grid: DensityGrid, name: str) -> DensityGrid:
+    """Return a grid with its values in the order of the axes of coordinates; messages call its medium by `name`.
+
+    Raises InputError for a box whose sides are not along the axes.
+    """
+    sides = grid.to_grid[:, :3]
+    axes = np.abs(sides).argmax(axis=1)  # of coordinates, along those of the grid
+    along = sides[np.arange(3), axes]
+    if np.abs(sides[:, axes] / along - np.eye(3)).max() > _TURNED:
+        raise InputError(
+            f"{name} has a grid whose box is turned; expected a to_world that scales, moves and mirrors, and turns by "
+            "right angles alone"
+        )
+    # A mirrored axis of the grid, u, is read from its other end: 1 - u.
+    forwards = np.where(along > 0, 0.0, 1.0) + np.sign(along) * grid.to_grid[:, 3]
+    order = np.argsort(axes)
+    values = np.flip(grid.values, tuple(2 - np.flatnonzero(along < 0)))
+    to_grid = np.column_stack([np.diag(np.abs(along[order])), forwards[order]])
+    return replace(grid, values=values.transpose(2 - order[::-1]), to_grid=to_grid)
 
 
 def _transform(medium: Any) -> Array:

@@ -27,7 +27,7 @@ from realtime.scene.closed_mesh import (
     read_bounds,
     touches,
 )
-from realtime.scene.density import DensityGrid, density_on_device, read_cloud_density, read_density
+from realtime.scene.density import DensityGrid, along_the_axes, density_on_device, read_cloud_density, read_density
 from realtime.scene.media.bounded import BoundedMedia, Clouds
 from realtime.scene.media.density_grid import GridMedium
 from realtime.scene.media.height_fog import HeightFog, Layer
@@ -35,6 +35,7 @@ from realtime.scene.media.light_paths import BoundedMedium
 from realtime.scene.media.medium import Homogeneous, Medium
 from realtime.scene.mesh_adjacency import scene_of
 from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
+from realtime.transforms import host_matrix
 
 _FEW = 4  # lights of a scene that every call may go over
 _PHASES = {
@@ -196,7 +197,7 @@ def _phase_key(phase) -> tuple[Any, ...]:
 
 def _surrounding(sensor, boundaries, bounds: Sequence[Bounds | ClosedMesh]):
     """Return the Mitsuba medium around the bounded ones, or None; refuse a camera or boundary that says otherwise."""
-    camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
+    camera = host_matrix(sensor.world_transform())[:3, 3]
     around = sensor.get_medium()
     for shape, own_bounds in zip(boundaries, bounds):
         if isinstance(own_bounds, Bounds) and touches(own_bounds, camera):
@@ -315,14 +316,10 @@ def _height_fog(medium, types: ArrayTypes) -> HeightFog:
 def _grid_medium(medium, types: ArrayTypes) -> GridMedium:
     """Read a grid around the camera, in a box along the axes of coordinates."""
     name = f"medium '{medium.id()}'"
-    albedo, grid = _constant_albedo(medium, types), read_density(medium, name)
-    sides = grid.to_grid[:, :3]
-    if np.abs(sides - np.diag(np.diag(sides))).max() > 1e-5 * np.abs(sides).max() or np.diag(sides).min() <= 0:
-        raise InputError(
-            f"{name} has a grid whose box is turned or mirrored; expected a to_world that scales and moves alone"
-        )
-    corner = -grid.to_grid[:, 3] / np.diag(sides)
-    low, high = (types.vector(*(float(each) for each in end)) for end in (corner, corner + 1 / np.diag(sides)))
+    albedo, grid = _constant_albedo(medium, types), along_the_axes(read_density(medium, name), name)
+    sides = np.diag(grid.to_grid)
+    corner = -grid.to_grid[:, 3] / sides
+    low, high = (types.vector(*(float(each) for each in end)) for end in (corner, corner + 1 / sides))
     dr.make_opaque(low, high)
     density, largest = density_on_device([grid], types), dr.opaque(types.scalar, grid.largest)
     return GridMedium(density, largest, low, high, albedo, _read_phase(medium.phase_function(), types))

@@ -34,6 +34,7 @@ from realtime.scene.media.height_fog import HeightFog
 from realtime.scene.media.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from realtime.scene.triangle_table import Facets, read_facets
+from realtime.transforms import beam_axis, host_matrix, spot_axis
 
 _UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that counts as upright in the image
 
@@ -188,23 +189,22 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
             f"light '{emitter.id()}' of type '{kind}' has a texture or a spectrum as intensity; give one 'rgb' value"
         )
     intensity = _read_colour(parameters["intensity.value"], f"the {kind} light's intensity", "W/sr")
-    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
-    position = np.array(parameters["position"], dtype=np.float64).reshape(-1) if kind == "point" else matrix[:3, 3]
+    place = parameters["position"] if kind == "point" else host_matrix(emitter.world_transform())[:3, 3]
+    position = np.array(place, dtype=np.float64).reshape(-1)
     arrays: dict[str, Any] = {
         "position": types.vector(*(float(c) for c in position)),
         "intensity": types.color(*(float(c) for c in intensity)),
     }
     if kind == "spot":
         cutoff, beam = _read_angles(parameters)
-        arrays |= spot_fields(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), cutoff, beam, types)
+        arrays |= spot_fields(spot_axis(emitter), cutoff, beam, types)
     dr.make_opaque(*arrays.values())
     return Light(**arrays)
 
 
 def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
     medium = bodies.medium
-    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
-    axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    axis = beam_axis(emitter)
     if isinstance(medium, HeightFog):
         if not axis @ np.array(medium.up, dtype=np.float64).ravel() < 0:
             raise InputError(
@@ -266,7 +266,7 @@ def _upwards(scene, camera: Camera) -> NDArray[np.float64]:
     falling = np.zeros(3)
     for emitter in scene.emitters():
         if emitter.class_name() == "DirectionalEmitter":
-            falling += np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 2]
+            falling += beam_axis(emitter)
     if not len(upright):
         return axes[np.argmax(axes @ up)]
     return upright[np.argmax(upright @ (-falling if falling.any() else up))]

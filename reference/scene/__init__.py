@@ -6,6 +6,8 @@ These are facts that Mitsuba reports. Each estimator derives for itself what fol
 Read in this order:
 
 - `device.py`: numbers of NumPy for compiled kernels;
+- `transforms.py`: transforms as matrices, and what their scales do to lights and spheres;
+- `colours.py`: colours of lights and media, checked;
 - `camera.py`: directions of rays through positions on the film;
 - `convex_bounds.py`: convex bounds of media, read and checked;
 - `directional_light.py`: directional lights: direction and irradiance;

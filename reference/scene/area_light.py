@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.scene.colours import colour
+from reference.scene.transforms import SAME, matrix_of, outwards
 
 Array = NDArray[np.float64]
 
@@ -22,7 +24,6 @@ _LIFT = 1e-9  # of a mesh's size and place: how far before its triangles its lig
 _CONVEX = 1e-6  # of the same: corners this far before a triangle are in its plane; float32
 _PAIRS = 1e9  # triangles times corners that are looked at to see whether a mesh is convex
 _BITS = 16  # of a coordinate by which triangles are put in order
-_SQUARE = 1e-5  # scales and angles of a float32 transform that differ by less are meant to be equal
 
 
 @dataclass(frozen=True)
@@ -107,14 +108,14 @@ def read_area_light(emitter: Any, camera: Array) -> ReferenceAreaLight:
         raise _refusal(shape, "has a texture as radiance", "one radiance: give its mean as 'rgb'")
     if shape.interior_medium() is not None or shape.exterior_medium() is not None:
         raise _refusal(shape, "bounds a medium", "two shapes, one that emits and one of material 'null' for the medium")
-    radiance = np.resize(np.array(parameters["radiance.value"], dtype=np.float64).reshape(-1), 3)
+    radiance = colour(parameters["radiance.value"], f"light '{shape.id()}': its radiance")
     opaque = shape.bsdf().class_name() != "Null"
     if kind is None:
         return _mesh(shape, radiance, opaque)
-    matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    matrix = matrix_of(mi.traverse(shape)["to_world"])
     frame, half = _sides(shape, kind, matrix)
     light = ReferenceAreaLight(kind, matrix[:3, 3], frame, half, radiance, opaque, shape)
-    if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + _SQUARE):
+    if kind == "sphere" and np.linalg.norm(camera - light.centre) <= light.radius * (1 + SAME):
         raise _refusal(shape, "holds the camera", "a camera outside of lights: move it, or make the sphere smaller")
     return light
 
@@ -171,18 +172,18 @@ def _sides(shape: Any, kind: str, matrix: Array) -> tuple[Array, Array]:
     axes = matrix[:3, :3].T
     used = axes if kind == "sphere" else axes[:2]
     length = np.linalg.norm(used, axis=1)
-    if not np.all(np.isfinite(matrix)) or length.min() <= _SQUARE**2 * max(1.0, length.max()):
+    if not np.all(np.isfinite(matrix)) or length.min() <= SAME**2 * max(1.0, length.max()):
         raise _refusal(shape, "has no area", "scales above zero")
     unit = used / length[:, None]
-    if np.abs(unit @ unit.T - np.eye(len(unit))).max() > _SQUARE:
+    if np.abs(unit @ unit.T - np.eye(len(unit))).max() > SAME:
         raise _refusal(shape, "is sheared", "axes at right angles to each other")
-    if kind != "rectangle" and np.ptp(length) > _SQUARE * length.max():
+    if kind != "rectangle" and np.ptp(length) > SAME * length.max():
         raise _refusal(shape, "has different scales along its axes", f"one scale: Mitsuba's {kind} is round")
     # Mitsuba says to which side the normal points; in float64 it is at right angles to the sides.
     across = np.cross(unit[0], unit[1])
     if kind == "sphere":
         if shape.has_flipped_normals():
-            raise _refusal(shape, "is inside out", "a sphere that emits outwards: remove flip_normals")
+            raise _refusal(shape, "is inside out", outwards(matrix))
         # Mitsuba takes the length of the first axis for the radius, see `reference.scene.shapes`.
         return np.stack([unit[0], unit[1], across]), np.full(2, length[0])
     towards = np.array(shape.sample_position(0.0, mi.Point2f(0.5)).n, dtype=np.float64).reshape(3)

@@ -10,6 +10,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from reference.scene.transforms import matrix_of
+
 Array = NDArray[np.float64]
 
 
@@ -55,4 +57,4 @@ def pixel_centres(size: tuple[int, int]) -> Array:
 
 def camera_matrix(sensor) -> Array:
     """Return the transform from the camera's own frame to the world, (4, 4), both in [m]."""
-    return np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    return matrix_of(sensor.world_transform())

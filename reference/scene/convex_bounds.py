@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.scene.transforms import SAME, matrix_of, outwards
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -54,7 +55,7 @@ def read_bounds(shape: Any) -> Bounds:
     """
     parameters = mi.traverse(shape)
     if shape.class_name() == "Sphere":
-        return _read_sphere(shape, np.array(parameters["to_world"].matrix, dtype=np.float64).reshape(4, 4))
+        return _read_sphere(shape, matrix_of(parameters["to_world"]))
     if not shape.is_mesh() or "vertex_positions" not in parameters:
         raise _refusal(shape, f"is a {shape.class_name().lower()}", "a sphere, a cube or a closed convex mesh")
     vertices = np.array(parameters["vertex_positions"], dtype=np.float64).reshape(-1, 3)
@@ -66,10 +67,10 @@ def read_bounds(shape: Any) -> Bounds:
 
 def _read_sphere(shape: Any, matrix: Array) -> Sphere:
     lengths = np.linalg.norm(matrix[:3, :3], axis=0)
-    if np.ptp(lengths) > 1e-5 * lengths.max():
+    if np.ptp(lengths) > SAME * lengths.max():
         raise _refusal(shape, "is a sphere with different scales along its axes", "one scale, or a mesh")
     if shape.has_flipped_normals():
-        raise _refusal(shape, "is inside out", "normals that point outwards: remove flip_normals")
+        raise _refusal(shape, "is inside out", outwards(matrix))
     return Sphere(matrix[:3, 3], float(lengths.mean()))
 
 

@@ -9,6 +9,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from analytic.errors import InputError
+from reference.scene.colours import colour
+from reference.scene.transforms import SAME, matrix_of
+
 Array = NDArray[np.float64]
 
 
@@ -27,8 +31,17 @@ def is_directional(emitter) -> bool:
 
 
 def read_directional(emitter) -> DirectionalLight:
-    """Read a directional emitter: its direction from the transform, its irradiance by asking at a point."""
-    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    """Read a directional emitter: its direction from the transform, its irradiance by asking at a point.
+
+    Raises InputError for a transform that scales the direction.
+    """
+    axis = matrix_of(emitter.world_transform())[:3, 2]
+    length = float(np.linalg.norm(axis))
+    if abs(length - 1) > SAME:
+        raise InputError(
+            f"light '{emitter.id()}' has a to_world that scales its direction by {length:g}, by which Mitsuba "
+            "multiplies its light on surfaces; expected no scale: remove it, or give 'direction' instead of 'to_world'"
+        )
     _, arriving = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
-    irradiance = np.array(arriving, dtype=np.float64).reshape(-1)
-    return DirectionalLight(matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]), np.broadcast_to(irradiance, 3), emitter)
+    irradiance = colour(arriving, f"light '{emitter.id()}': its irradiance")
+    return DirectionalLight(axis / length, irradiance, emitter)

@@ -18,8 +18,10 @@ from analytic.errors import InputError
 from analytic.phase import PhaseFunction
 from reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
 from reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from reference.scene.colours import colour
 from reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
 from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
+from reference.scene.transforms import SAME, matrix_of, stretch
 from reference.scene.varying import (
     NO_EXTINCTION,
     GridMedium,
@@ -34,6 +36,7 @@ from reference.scene.varying import (
 Array = NDArray[np.float64]
 
 _SHAPE_MARGIN = 1e-5  # of the side of a grid, by which a shape around it may be rounded
+_LARGEST_ALBEDO = 1 + 1e-6  # rounding
 _AROUND = ("ConstantBackgroundEmitter", "EnvironmentMapEmitter")
 
 
@@ -191,7 +194,7 @@ def _sky(background, medium: ReferenceMedium | VaryingMedium) -> Array | None:
         if not np.all(medium.sigma_t > 0):
             raise InputError("a sky shines through a medium without bounds in some channels; expected bounds")
         return None
-    return _rgb(background.eval(dr.zeros(mi.SurfaceInteraction3f)))
+    return colour(background.eval(dr.zeros(mi.SurfaceInteraction3f)), f"light '{background.id()}': its radiance")
 
 
 def whole_scene(reference: ReferenceScene):
@@ -328,15 +331,16 @@ def read_medium(medium, name: str) -> ReferenceMedium:
         )
     parameters = mi.traverse(medium)
     _require_constant(parameters, "sigma_t", name)
-    sigma_t = _rgb(parameters["sigma_t.value.value"]) * float(parameters["scale"])
-    return ReferenceMedium(sigma_t, *read_scattering(medium), medium)
+    sigma_t = np.array(parameters["sigma_t.value.value"], dtype=np.float64) * float(parameters["scale"])
+    return ReferenceMedium(colour(sigma_t, f"{name}: its sigma_t"), *read_scattering(medium), medium)
 
 
 def read_scattering(medium) -> tuple[Array, PhaseFunction]:
     """Return the albedo of a medium, RGB, one number or colour everywhere, and its phase function."""
     parameters = mi.traverse(medium)
     _require_constant(parameters, "albedo", f"medium '{medium.id()}'")
-    return _rgb(parameters["albedo.value.value"]), _read_phase(medium.phase_function())
+    albedo = colour(parameters["albedo.value.value"], f"medium '{medium.id()}': its albedo", largest=_LARGEST_ALBEDO)
+    return albedo, _read_phase(medium.phase_function())
 
 
 def _require_constant(parameters, coefficient: str, name: str) -> None:
@@ -367,8 +371,14 @@ def _read_light(emitter) -> ReferenceLight:
             "'spot', 'directional', 'area' or 'constant'"
         )
     parameters = mi.traverse(emitter)
-    matrix = np.array(emitter.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    matrix = matrix_of(emitter.world_transform())
     spot = name == "SpotLight"
+    if spot and stretch(matrix) - 1 > SAME:
+        raise InputError(
+            f"light '{emitter.id()}' has a to_world that stretches its cone, {stretch(matrix):.6g} to 1; expected one "
+            "scale for all axes and no shear, which a 'rotate' brings whose axis is not of unit length: take the scale "
+            "away, in a modelling program before the export"
+        )
     position = matrix[:3, 3] if spot else np.array(parameters["position"], dtype=np.float64).reshape(3)
     axis = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]) if spot else np.array([0.0, 0.0, 1.0])
     # Mitsuba's own answer at a far point on the axis, where positions lose no digits that matter.
@@ -377,24 +387,27 @@ def _read_light(emitter) -> ReferenceLight:
     interaction.p = mi.Point3f(*(float(c) for c in position + distance * axis))
     dr.make_opaque(interaction)  # one kernel for all lights of a kind
     _, arriving = emitter.sample_direction(interaction, mi.Point2f(0.5))
-    intensity = _as_given(parameters, _rgb(arriving) * distance**2)
+    intensity = _as_given(emitter, colour(arriving, f"light '{emitter.id()}': its intensity") * distance**2)
     if not spot:
         return ReferenceLight(position, intensity)
-    cutoff = np.deg2rad(float(parameters["cutoff_angle"][0]))
+    degrees = float(parameters["cutoff_angle"][0])
+    if not 0 < degrees < 90:
+        raise InputError(
+            f"light '{emitter.id()}': its cutoff_angle is {degrees:g} degrees; expected more than 0 and less than "
+            "90: a wider light is a 'point' light"
+        )
+    cutoff = np.deg2rad(degrees)
     return ReferenceLight(
         position, intensity, axis, cutoff, min(np.deg2rad(float(parameters["beam_width"][0])), cutoff)
     )
 
 
-def _as_given(parameters, measured: Array) -> Array:
+def _as_given(emitter, measured: Array) -> Array:
     """Return the intensity as the scene gives it, where that is what was measured: measuring rounds it to float32."""
+    parameters = mi.traverse(emitter)
     if "intensity.value" not in parameters:
         return measured
-    texture = _rgb(parameters["texture.value"]) if "texture.value" in parameters else np.ones(3)
-    given = _rgb(parameters["intensity.value"]) * texture
-    return given if given.shape == measured.shape and np.allclose(given, measured, rtol=1e-5, atol=0) else measured
-
-
-def _rgb(value) -> Array:
-    flat = np.array(value, dtype=np.float64).reshape(-1)
-    return np.repeat(flat, 3) if flat.size == 1 else flat
+    texture = np.array(parameters["texture.value"], dtype=np.float64) if "texture.value" in parameters else 1.0
+    given = np.array(parameters["intensity.value"], dtype=np.float64) * texture
+    given = colour(given, f"light '{emitter.id()}': its intensity")
+    return given if np.allclose(given, measured, rtol=1e-5, atol=0) else measured

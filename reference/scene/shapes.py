@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from analytic.errors import InputError
 from reference.scene.convex_bounds import Sphere
+from reference.scene.transforms import SAME, matrix_of
 
 Array = NDArray[np.float64]
-
-_ROUND = 1e-5  # scales of a disk that differ by less are meant to be equal
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def _read(shape) -> Array | Sphere | Disks:
             f"shape '{shape.id()}' is a {shape.class_name().lower()}; expected meshes, rectangles, spheres and disks, "
             "whose shadows are exact: replace it by a mesh, as fine as you need"
         )
-    if abs(length[0] - length[1]) > _ROUND * length[0] or abs(matrix[:3, 0] @ matrix[:3, 1]) > _ROUND * length[0] ** 2:
+    if abs(length[0] - length[1]) > SAME * length[0] or abs(matrix[:3, 0] @ matrix[:3, 1]) > SAME * length[0] ** 2:
         raise InputError(f"shape '{shape.id()}' is an oval disk; expected a round one, or a mesh")
     normal = np.cross(matrix[:3, 0], matrix[:3, 1])
     return Disks(matrix[None, :3, 3], normal[None] / np.linalg.norm(normal), length[:1])
@@ -130,4 +129,4 @@ def triangles_of(shape) -> Array:
 
 
 def _matrix(shape) -> Array:
-    return np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    return matrix_of(mi.traverse(shape)["to_world"])

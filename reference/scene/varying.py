@@ -6,13 +6,15 @@ r"""Media around the camera whose extinction differs from place to place: height
 
 **A density grid** is a `heterogeneous` medium with a `gridvolume`. Values sit at the centres of voxels, (i + 1/2)/n of
 the box of `to_world`. Between centres the extinction is trilinear, in the outer half voxels constant across the faces,
-beyond the box 0. Mitsuba tells Python values and, in words of six digits, the box; rays find its corners to all digits.
-Extinctions at random places are then compared with Mitsuba's, so that no other filter, wrap mode or transform is taken
-for this.
+beyond the box 0. Mitsuba tells Python the values and the box of the volume, and not which side of the box is which axis
+of the grid. Extinctions at random places are therefore compared with Mitsuba's for each way in which the grid can lie
+in the box, mirrored and turned by right angles. One must agree, so that no other filter, wrap mode or transform is
+taken for this.
 """
 
-import re
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import permutations, product
 from typing import Any
 
 import drjit as dr
@@ -141,17 +143,31 @@ def read_grid(medium, albedo: Array, phase: PhaseFunction) -> GridMedium:
     values, low, high = grid_values(medium, name)
     largest = np.full(3, values.max())
     grid = GridMedium(values=values, low=low, high=high, albedo=albedo, phase=phase, largest=largest, plugin=medium)
+    # Mitsuba's extinctions at random places in the box.
     fraction = np.random.default_rng(1).random((_PLACES, 3))
-    place = dr.zeros(mi.MediumInteraction3f, _PLACES)
-    place.p = mi.Point3f((low + fraction * (high - low)).T)
-    theirs = np.array(medium.get_scattering_coefficients(place)[2], dtype=np.float64)[0]
-    worst = np.abs(theirs - _trilinear(values, fraction * values.shape[::-1] - 0.5)).max() / values.max()
-    if worst > _DIFFERENCE:
-        raise InputError(
-            f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; expected a "
-            "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales and moves alone"
-        )
-    return grid
+    interaction = dr.zeros(mi.MediumInteraction3f, _PLACES)
+    interaction.p = mi.Point3f((low + fraction * (high - low)).T)
+    theirs = np.array(medium.get_scattering_coefficients(interaction)[2], dtype=np.float64)[0]
+    # The grid as it lies in the box: the first way that agrees; of ways that agree all give the same extinctions.
+    worst = np.inf
+    for turned in _turned(values):
+        difference = np.abs(theirs - _trilinear(turned, fraction * turned.shape[::-1] - 0.5)).max() / values.max()
+        if difference <= _DIFFERENCE:
+            return replace(grid, values=turned)
+        worst = min(worst, float(difference))
+    raise InputError(
+        f"{name} has a grid that is not read as Mitsuba reads it, by {worst:.2g} of its largest value; expected a "
+        "'gridvolume' with filter_type 'trilinear', wrap_mode 'clamp' and a to_world that scales, moves, mirrors and "
+        "turns by right angles"
+    )
+
+
+def _turned(values: Array) -> Iterator[Array]:
+    """Yield a grid with its axes in every order, each forwards or backwards; as it is first."""
+    ways = (slice(None), slice(None, None, -1))
+    for order in permutations(range(3)):
+        for way in product(ways, repeat=3):
+            yield values.transpose(order)[way]
 
 
 def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
@@ -169,24 +185,9 @@ def grid_values(medium: Any, name: str) -> tuple[Array, Array, Array]:
         raise InputError(f"{name} has densities below 0 or not finite; expected finite ones of 0 or more")
     if not values.max() > 0:
         raise InputError(f"{name} has a grid that is 0 everywhere; expected densities above 0 somewhere")
-    return values, *_box(medium)
-
-
-def _box(medium: Any) -> tuple[Array, Array]:
-    """Return the corners of the box of a medium [m]: roughly by words, then by rays along the axes."""
-    words = str(medium).partition("sigma_t =")[2]
-    found = re.search(r"min = \[(.*?)\],\s*max = \[(.*?)\]", words, re.S)
-    if found is None:
-        raise InputError(f"Mitsuba says no box of medium '{medium.id()}'; expected a 'gridvolume' as sigma_t")
-    low, high = (np.array([float(number) for number in part.split(",")]) for part in found.groups())
-    middle, corners = 0.5 * (low + high), np.stack([low, high])
-    for axis in range(3):
-        start = middle - np.eye(3)[axis] * (high - low)
-        ray = mi.Ray3f(mi.Point3f(*start.tolist()), mi.Vector3f(*np.eye(3)[axis].tolist()))
-        meets, near, far = medium.intersect_aabb(ray)
-        if meets[0]:
-            corners[:, axis] = float(np.float32(start[axis])) + np.array([float(near[0]), float(far[0])])
-    return corners[0], corners[1]
+    box = next(part for part in parameters.hierarchy if part.class_name() == "GridVolume").bbox()
+    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (box.min, box.max))
+    return values, low, high
 
 
 def _trilinear(values: Array, place: Array) -> Array:

@@ -158,7 +158,7 @@ def test_a_linear_function_of_height_has_no_error_of_interpolation(reference):
     [
         ({"more": '<string name="filter_type" value="nearest"/>'}, "filter_type 'trilinear'"),
         ({"more": '<string name="wrap_mode" value="repeat"/>'}, "wrap_mode 'clamp'"),
-        ({"turn": '<rotate z="1" angle="30"/>'}, "scales and moves alone"),
+        ({"turn": '<rotate z="1" angle="30"/>'}, "turns by right angles"),
         ({"values": np.repeat(ROUGH[..., None], 3, axis=3)}, "a grid of 3 channels"),
         ({"values": ROUGH - 0.5}, "expected finite numbers"),
         (

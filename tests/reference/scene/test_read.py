@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Both sides read the same scene; area lights and clouds are read as they are, rays and the epsilon are Mitsuba's."""
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -39,6 +40,26 @@ def test_both_sides_read_the_same_scene(variant):
     cone = reference.lights[1]
     assert cone.axis == pytest.approx(np.array(other.lights[1].axis).ravel(), abs=1e-6)
     assert np.rad2deg([cone.cutoff, cone.beam]) == pytest.approx([31, 17])
+
+
+@pytest.mark.parametrize("scale", [[3.0, 3.0, 3.0], [-1.0, 1.0, 1.0], [0.5, 0.5, -0.5]])
+def test_one_scale_and_a_mirror_leave_a_spot_as_it_is(variant, scale):
+    """Mitsuba compares angles with the cone, which neither changes; the light travels along the image of z."""
+    plain = spot(cutoff=31.0, beam=17.0)
+    turned = plain["to_world"] @ mi.ScalarTransform4f().scale(scale)
+    scene = mi.load_dict(tiny_scene(spot=plain | {"to_world": turned}))
+    way = np.sign(scale[2]) * np.array([-0.6, 0.4, -2.2]) / np.linalg.norm([-0.6, 0.4, -2.2])
+    reference, other = read_reference(scene).lights[1], read_scene(scene).lights[1]
+    np.testing.assert_allclose(reference.axis, way, atol=1e-6)
+    np.testing.assert_allclose(np.ravel(other.axis), way, atol=1e-6)
+    # Mitsuba's own answer 27 degrees off the axis, in the cone's edge.
+    side = np.cross(way, [0, 1, 0]) / np.linalg.norm(np.cross(way, [0, 1, 0]))
+    angle = np.deg2rad(27)
+    interaction = dr.zeros(mi.Interaction3f)
+    interaction.p = mi.Point3f((reference.position + 8 * (np.cos(angle) * way + np.sin(angle) * side)).tolist())
+    arriving = np.ravel(scene.emitters()[1].sample_direction(interaction, mi.Point2f(0.5))[1]) * 64
+    fraction = (reference.cutoff - angle) / (reference.cutoff - reference.beam)
+    np.testing.assert_allclose(arriving, fraction * reference.intensity, rtol=1e-4)
 
 
 @pytest.mark.claim("pixel-centre", tolerance="5e-7: Mitsuba's float32 matrices")

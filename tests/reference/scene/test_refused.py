@@ -16,10 +16,10 @@ from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.suns import sun
 from validation.scenes.meshes import box, prism, star
 from validation.scenes.numbers import check_numbers
-from validation.scenes.parts import medium_boundary
+from validation.scenes.parts import medium_boundary, point_light
 
 FOG = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
-CUBE, CLEAR = {"type": "cube"}, {"bsdf": {"type": "null"}}
+CUBE, SPHERE, CLEAR = {"type": "cube"}, {"type": "sphere"}, {"bsdf": {"type": "null"}}
 BOX = box((1.0, 1.1, 1.2))
 
 
@@ -46,6 +46,22 @@ def radiance(value) -> dict[str, Any]:
 
 def texture() -> dict[str, Any]:
     return {"type": "bitmap", "bitmap": mi.Bitmap(np.ones((2, 2, 3), dtype=np.float32)), "raw": True}
+
+
+def scaled(part: dict[str, Any], *scale: float) -> dict[str, Any]:
+    """Return a shape or a light whose object is scaled along its axes."""
+    turned = part.get("to_world", mi.ScalarTransform4f())
+    return part | {"to_world": turned @ mi.ScalarTransform4f().scale(list(scale))}
+
+
+def beside(light: dict[str, Any]) -> dict[str, Any]:
+    """Return a ball of fog in vacuum beside a light."""
+    return clear_scene(lamp=light, puff=bounded_medium(SPHERE, 0.3, (0.7, 0.7, 0.7)))
+
+
+def beam(scale: float) -> dict[str, Any]:
+    turned = mi.ScalarTransform4f().look_at([0, 0, 4], [1, 1, 0], [0, 1, 0])
+    return scaled({"type": "directional", "to_world": turned}, 1, 1, scale)
 
 
 def sheared():
@@ -84,7 +100,18 @@ BOTH = [
     (lambda: clear_scene(puff=CUBE | CLEAR | {"exterior": FOG}), "'puff' is a hole in a medium"),
     (lambda: holding({"type": "cylinder"}), "'puff' bounds a medium and is a cylinder"),
     (lambda: holding({"type": "disk"}), "'puff' bounds a medium and is a disk"),
-    (lambda: holding({"type": "sphere", "flip_normals": True}), "'puff' bounds a medium and is inside out"),
+    (
+        lambda: holding({"type": "sphere", "flip_normals": True}),
+        "'puff' bounds a medium and is inside out.*remove flip",
+    ),
+    (lambda: holding(scaled(SPHERE, -1, 1, 1)), "'puff' bounds a medium and is inside out.*negative scale"),
+    (lambda: tiny_scene(lamp=scaled(spot(), 2, 1, 1)), "light 'lamp' .*stretches its cone"),
+    (lambda: tiny_scene(lamp=scaled(spot(), 1, 1, 0.2)), "light 'lamp' .*stretches its cone"),
+    (lambda: tiny_scene(lamp=spot() | {"to_world": sheared()}), "light 'lamp' .*stretches its cone"),
+    (
+        lambda: beside(beam(3.0)),
+        "light 'lamp' .*scales its direction by 3",
+    ),
     (lambda: mesh(BOX[0], BOX[1][:, ::-1]), "'puff' bounds a medium and is inside out"),
     (lambda: mesh(BOX[0], BOX[1][1:]), "'puff' bounds a medium and is not a closed surface"),
     (lambda: lit("cylinder"), "light 'lamp'.* is a cylinder"),
@@ -92,16 +119,18 @@ BOTH = [
     (lambda: lit("disk", size=(0.3, 0.2)), "light 'lamp'.*one scale"),
     (lambda: lit("rectangle", size=(0.0, 0.3)), "light 'lamp'.* has no area"),
     (lambda: lit("sphere", size=0.3, flip_normals=True), "light 'lamp'.*remove flip_normals"),
+    (lambda: tiny_scene(lamp=scaled(area_lamp("sphere", size=0.3), 1, 1, -1)), "light 'lamp'.*negative scale"),
     (lambda: lit("sphere", size=9.0), "light 'lamp'.* camera"),
     (lambda: lit("sphere", size=0.3, material={"type": "null"}, interior=FOG), "light 'lamp'.* bounds a medium"),
     (lambda: lit("rectangle", **radiance(texture())), "light 'lamp'.* textur"),
 ]
-#: Numbers that are refused before either side reads a scene, and by the methods too.
+#: Numbers that are refused before either side reads a scene, and by both sides.
 NUMBERS = [
     (lambda: fog(sigma_t=-1.0), "sigma_t"),
     (lambda: fog(sigma_t=float("nan")), "sigma_t"),
     (lambda: fog(albedo=1.5), "albedo"),
     (lambda: tiny_scene(spot=spot(cutoff=95.0, beam=90.0)), "cutoff_angle .* 95 degrees; expected more than 0"),
+    (lambda: tiny_scene(lamp=point_light((0.7, 0.3, 1.9), (-1.0, 2.0, 2.0))), "intensity"),
     (lambda: lit("disk", size=0.3, **radiance({"type": "rgb", "value": [-1.0, 0.0, 0.0]})), "light '.*radiance"),
 ]
 #: Scenes that only the methods refuse.
@@ -118,7 +147,7 @@ REFERENCE = [(lambda: mesh(*prism(star(0.4, 1.0, 5), 1.0)), "'puff' bounds a med
     ("make", "words", "readers"),
     [
         *((*case, (read_scene, read_reference)) for case in BOTH),
-        *((*case, (read_scene, check_numbers)) for case in NUMBERS),
+        *((*case, (read_scene, read_reference, check_numbers)) for case in NUMBERS),
         *((*case, (read_scene,)) for case in METHODS),
         *((*case, (read_reference,)) for case in REFERENCE),
     ],

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Colours of Mitsuba's lights and media as three numbers, each of which must be one that an image can have."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analytic.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def colour(value: Any, name: str, *, largest: float = np.inf) -> Array:
+    """Return a number or a colour of Mitsuba as RGB, (3,).
+
+    Raises InputError, in which it is called `name`, for what is not finite, below 0, or above the largest value.
+    """
+    numbers = np.array(value, dtype=np.float64).reshape(-1)
+    if not np.all(np.isfinite(numbers) & (numbers >= 0) & (numbers <= largest)):
+        given = ", ".join(f"{number:g}" for number in numbers)
+        most = f"from 0 to {largest:.3g}" if np.isfinite(largest) else "of 0 or more"
+        raise InputError(f"{name} is {given}; expected finite numbers {most}")
+    return np.repeat(numbers, 3) if numbers.size == 1 else numbers
