@@ -227,11 +227,11 @@ def integrals(
     Parameters
     ----------
     cases
-        A CSV file with the columns of airlight_integral.csv; x1 may be inf. Its phase functions are isotropic,
-        rayleigh, hazy, murky, hg, hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH and mie-modified. From Python also
-        columns by name, of any shapes that broadcast together: `phase`, `g` for hg, `x0`, `x1` [m], `sigma_t` [1/m],
-        and either `foot` and `height` [m] or `origin`, `direction` and `light`, (..., 3); or a data frame with such
-        columns.
+        A CSV file with the columns `foot`, `height`, `x0`, `x1` [m] and `sigma_t` [1/m]; x1 may be inf. The column
+        `phase` may name isotropic (the default), rayleigh, hazy, murky, hg (with its mean cosine in a column `g`),
+        hg-draine:DIAMETER, mie:RADIUS:GAMMA:WAVELENGTH or mie-modified; `value` is what to compare with. From Python
+        also columns by name, of any shapes that broadcast together, or a data frame; `origin`, `direction` and
+        `light`, (..., 3), may stand for `foot` and `height`.
     kernel
         Airlight kernel, see `airlight list kernels`.
     precision

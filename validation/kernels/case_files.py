@@ -3,11 +3,11 @@
 
 Two sets of columns are known, each in any order and beside others:
 
-    tag, phase, g, t, h, x0, x1, sigma_t, value                         the ray by foot (t) and height (h)
+    tag, phase, g, foot, height, x0, x1, sigma_t, value                 the ray by foot and height, or t and h
     phase, g, ox, oy, oz, dx, dy, dz, lx, ly, lz, x0, x1, sigma_t, value      the ray by origin, direction and light
 
-`phase` is in the words of `analytic.phase.phase_from_words`, such as hg or mie:6. `tag`, `g` (then 0) and `value` may
-be missing. An x1 of `inf` is a ray that never ends.
+`phase` is in the words of `analytic.phase.phase_from_words`, such as hg or mie:6. `tag`, `phase` (then isotropic), `g`
+(then 0) and `value` may be missing. An x1 of `inf` is a ray that never ends.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,10 +26,10 @@ from validation.arrays import Array, Bools
 from validation.readers import read_csv
 
 _RAY = ("ox", "oy", "oz", "dx", "dy", "dz", "lx", "ly", "lz")
-_FOOT = ("t", "h")
-_NAMES = {"foot": "t", "height": "h"}  # the names of the design, and those of the files
+_FOOT = ("foot", "height")
+_SHORT = {"foot": "t", "height": "h"}  # as the certified file has them
 _VECTORS = {"origin": _RAY[:3], "direction": _RAY[3:6], "light": _RAY[6:]}
-_KNOWN = frozenset(("phase", "tag", "g", "x0", "x1", "sigma_t", "value", *_FOOT, *_RAY))
+_KNOWN = frozenset(("phase", "tag", "g", "x0", "x1", "sigma_t", "value", *_FOOT, *_SHORT.values(), *_RAY))
 
 
 @dataclass(frozen=True)
@@ -74,15 +74,15 @@ def read_cases(path: str | Path) -> Cases:
 def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ...]]:
     """Return cases from columns in memory, and the shape that their values have together.
 
-    `columns`: by name the columns of this module, of any shapes that broadcast together. `foot` and `height` may
-    stand for `t` and `h`, and `origin`, `direction` and `light`, (..., 3), for the coordinates of rays. Raises
-    InputError as `read_cases`, and for columns whose shapes do not go together; messages count rows from 0.
+    `columns`: by name the columns of this module, of any shapes that broadcast together; `origin`, `direction` and
+    `light`, (..., 3), may stand for the coordinates of rays. Raises InputError as `read_cases`, and for columns whose
+    shapes do not go together; messages count rows from 0.
     """
     given: dict[str, Any] = {}
     for key, values in columns.items():
         column = np.asarray(values)
         if key not in _VECTORS:
-            given[_NAMES.get(key, key)] = column
+            given[key] = column
         elif column.ndim == 0 or column.shape[-1] != 3:
             raise InputError(f"cases, column '{key}': got an array of shape {column.shape}, expected (..., 3)")
         else:
@@ -103,11 +103,15 @@ def cases_from_columns(columns: Mapping[str, Any]) -> tuple[Cases, tuple[int, ..
 def _checked(table: "_Table") -> Cases:
     """Return the cases of a table."""
     header = tuple(table.columns)
-    rays = "t" not in header and any(name in header for name in _RAY)
-    table.require("phase", *(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
+    for name, short in _SHORT.items():
+        if name in header and short in header:
+            raise InputError(f"{table.name}: the columns '{name}' and '{short}' are the same; leave one of them out")
+    rays = table.named("foot") not in header and any(name in header for name in _RAY)
+    table.require(*(_RAY if rays else _FOOT), "x0", "x1", "sigma_t")
     columns = {name: table.numbers(name) for name in ("x0", "x1", "sigma_t", *(_RAY if rays else _FOOT))}
     g = table.numbers("g") if "g" in header else np.zeros(table.count)
-    phase = tuple(cell.strip().lower() for cell in table.cells("phase"))
+    words = table.cells("phase") if "phase" in header else ["isotropic"] * table.count
+    phase = tuple(cell.strip().lower() for cell in words)
     for row, name in enumerate(phase):
         reason = "'tabulated' has no place for its table here" if name == "tabulated" else _fault(name)
         if reason:
@@ -122,8 +126,8 @@ def _checked(table: "_Table") -> Cases:
         table.check("dx", np.abs(length - 1) <= 1e-5, "a direction of length 1")
         foot, height = foot_and_height(origin, direction, light)
     else:
-        foot, height = columns["t"], columns["h"]
-        table.check("h", height >= 0, "a number >= 0")
+        foot, height = columns["foot"], columns["height"]
+        table.check("height", height >= 0, "a number >= 0")
     return Cases(
         phase,
         np.where(np.array(phase) == "hg", g, 0.0),
@@ -180,31 +184,30 @@ class _Table:
         """How many cases there are."""
         return len(next(iter(self.columns.values()))) if self.columns else 0
 
+    def named(self, name: str) -> str:
+        """Return the name that the table has for a column: foot and height have short ones, too."""
+        return name if name in self.columns else _SHORT.get(name, name)
+
     def require(self, *names: str) -> None:
         """Refuse a table without these columns."""
-        missing = [name for name in names if name not in self.columns]
+        missing = [name for name in names if self.named(name) not in self.columns]
         if not missing:
             return
-        known = ", ".join(self.columns) or "none"
-        if self.lines:
-            raise InputError(
-                f"{self.name}, line 1: no column '{missing[0]}'; the file has {known}: add it, the columns wanted are "
-                f"phase, x0, x1, sigma_t and either t, h or {', '.join(_RAY)}"
-            )
-        wanted = {key: word for word, key in _NAMES.items()}.get(missing[0], missing[0])
+        place = f"{self.name}, line 1" if self.lines else self.name
+        rays = ", ".join(_RAY if self.lines else _VECTORS)
         raise InputError(
-            f"{self.name}: no column '{wanted}'; got {known}; expected phase, x0, x1, sigma_t and either foot and "
-            "height or origin, direction and light"
+            f"{place}: no column '{missing[0]}'; got {', '.join(self.columns) or 'none'}; expected x0, x1, sigma_t "
+            f"and either foot and height or {rays}"
         )
 
     def cells(self, name: str) -> list[str]:
         """Return the text of the column `name`, one entry for each row."""
-        return [str(value) for value in np.asarray(self.columns[name]).tolist()]
+        return [str(value) for value in np.asarray(self.columns[self.named(name)]).tolist()]
 
     def where(self, row: int, name: str) -> str:
         """Return the words for a message that name the cell of a row in the column `name`."""
         place = f"line {self.lines[row]}" if self.lines else f"row {row}"
-        return f"{self.name}, {place}, column '{name}'"
+        return f"{self.name}, {place}, column '{self.named(name)}'"
 
     def numbers(self, name: str, *, infinite: bool = False) -> Array:
         """Return the column `name` as numbers, (rows,), finite except for `x1` and where `infinite` allows it.
@@ -212,7 +215,7 @@ class _Table:
         Raises InputError for a cell that is no number, or not finite, with its place.
         """
         try:
-            values = np.array(self.columns[name], dtype=np.float64)
+            values = np.array(self.columns[self.named(name)], dtype=np.float64)
         except (TypeError, ValueError):
             row = next((row for row, cell in enumerate(self.cells(name)) if not _is_number(cell)), 0)
             raise InputError(f"{self.where(row, name)}: '{self.cells(name)[row]}' is not a number; write one") from None

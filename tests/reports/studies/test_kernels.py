@@ -40,7 +40,7 @@ def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant, 
     with integrals.save(tmp_path / "results.csv").open() as file:
         written = list(csv.DictReader(file))
     np.testing.assert_array_equal([float(row["result"]) for row in written], integrals.J.ravel())
-    np.testing.assert_array_equal([float(row["h"]) for row in written], np.tile(height, 5))
+    np.testing.assert_array_equal([float(row["height"]) for row in written], np.tile(height, 5))
     own = airlight.study("integrals", rays, third, precision="double")
     assert own.kernel.endswith(":third")
     exact = airlight.study("integrals", rays, precision="double")

@@ -333,6 +333,16 @@ def test_both_files(data_folder):
     assert (rays.height >= 0).all()
 
 
+def test_foot_and_height_have_two_names_and_fog_without_a_phase_function_is_isotropic(tmp_path):
+    """Those of the documentation and short ones; both together are refused, whatever they hold."""
+    short = read_cases(case_file(tmp_path, HEAD + "isotropic,0,1.5,0.4,0,10,0.12\n"))
+    page = read_cases(case_file(tmp_path, "foot,height,x0,x1,sigma_t\n1.5,0.4,0,10,0.12\n"))
+    assert (page.foot, page.height, page.phase) == (short.foot, short.height, short.phase)
+    assert page.header == ("foot", "height", "x0", "x1", "sigma_t")
+    with pytest.raises(InputError, match="'height' and 'h' are the same"):
+        read_cases(case_file(tmp_path, "foot,height,h,x0,x1,sigma_t\n1.5,0.4,0.4,0,10,0.12\n"))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
