@@ -28,7 +28,7 @@ def scene_chart(scenes: Sequence[Scene], place: int) -> str:
 
     The point of the n-th method that has images has the name "point-n", and says what it is under the pointer.
     """
-    rows = (row for scene in scenes for row in scene.methods)
+    rows = ((row.method, row.label) for scene in scenes for row in scene.methods)
     styles, scene = {label: style | _SIZE for label, style in report_styles(rows).items()}, scenes[place]
     figure = new_figure(5.2, 3.0)
     panel = figure.subplots()

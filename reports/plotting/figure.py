@@ -81,7 +81,7 @@ def speed_chart(scenes: Sequence[Scene], width: float, *, across: int, tallest: 
     """
     timed = [scene for scene in scenes if any(map(has_point, scene.methods))]
     there = {entry.label for scene in timed for entry in scene.methods if has_point(entry)}
-    rows = (row for scene in scenes for row in scene.methods)
+    rows = ((row.method, row.label) for scene in scenes for row in scene.methods)
     styles = {label: style | marks for label, style in report_styles(rows).items() if label in there}
     across = min(len(timed), across)
     down, lines = -(-len(timed) // across), -(-len(styles) // min(3, across))

@@ -9,9 +9,10 @@ one method (its kernel, its parameters) keep colour and marker and differ by the
 Nothing heavy is imported at the top, and nothing is set: `figure_style` changes matplotlib's settings for a block.
 """
 
-import zlib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -34,18 +35,23 @@ COLOURS: Mapping[str, str] = {
 #: Width of a figure [inches] by column.
 WIDTHS: Mapping[str, float] = {"single": 3.5, "double": 7.16}
 
+# By method, as a report may be drawn where Mitsuba, and with it the registry of methods, is missing.
 _METHODS = {
     "unshadowed": ("sky", "o"),
     "ray-march": ("vermillion", "s"),
+    "equi-angular": ("vermillion", "8"),
     "shadow-planes": ("blue", "^"),
     "light-volumes": ("green", "D"),
     "min-max": ("purple", "v"),
     "froxel-fog": ("orange", "h"),
+    "soft-shafts": ("navy", "p"),
     # No chart has methods for fog and for clouds.
     "cloud-octaves": ("orange", "P"),
     "cloud-collectors": ("blue", "^"),
 }
-_OTHERS = (("wine", "X"), ("navy", "*"))  # methods of users and images of engines
+_HISTORY = "+history"  # ends the name of a method whose frames are averaged
+#: Colours and markers of all others: methods of users, and images of engines.
+_OTHERS = (("wine", "X"), ("navy", "*"), ("wine", "P"), ("navy", "d"), ("wine", "<"), ("navy", ">"))
 # Kernels that are variants of one idea share the colour.
 _KERNELS = {
     "exact": ("blue", "o"),
@@ -64,22 +70,14 @@ _FILLS = ("full", "none", "left", "right", "top", "bottom")
 _SHEETS = Path(__file__).parent / "styles"
 
 
-def method_style(method: str, variant: int = 0) -> dict[str, Any]:
-    """Return matplotlib's properties of a method's markers and lines.
-
-    A method that is not built in ('module:function', an image) has one of the two styles kept for such, always the same
-    for the same name; `report_styles` keeps several apart. Variants have other fillings of the same marker, all
-    different up to the twelfth.
-    """
-    colour, marker = _METHODS.get(method) or _OTHERS[zlib.crc32(method.encode()) % len(_OTHERS)]
-    return _marker_style(colour, marker, variant)
-
-
-def kernel_style(kernel: str, variant: int = 0) -> dict[str, Any]:
-    """Return matplotlib's properties of a kernel's markers and lines; 'name-N' looks like 'name'."""
-    base, _, digits = kernel.rpartition("-")
-    name = base if digits.isdecimal() and base in _KERNELS else kernel
-    return _marker_style(*_KERNELS.get(name, _OTHER_KERNEL), variant)
+def kernel_styles(kernels: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Return the style of the markers and lines of each kernel; 'name-N' looks like 'name'."""
+    pairs = {}
+    for kernel in kernels:
+        base, _, digits = kernel.rpartition("-")
+        name = base if digits.isdecimal() and base in _KERNELS else kernel
+        pairs[kernel] = _KERNELS.get(name, _OTHER_KERNEL)
+    return _numbered(pairs)
 
 
 def reference_style() -> dict[str, Any]:
@@ -87,25 +85,21 @@ def reference_style() -> dict[str, Any]:
     return {"color": "black", "linestyle": "-", "linewidth": 1.3}
 
 
-def report_styles(rows: Iterable[Any]) -> dict[str, dict[str, Any]]:
+def report_styles(shown: Iterable[tuple[str, str]]) -> dict[str, dict[str, Any]]:
     """Return the marker style of every label of a report, the same in its page and in all figures made from it.
 
-    Rows have a `method` and a `label`. Variants of a method are numbered in the order in which they come. Among methods
-    that are not built in, the first two have their own styles, which the next ones use again.
+    `shown` are pairs of a method and a label. Variants of a method, with history too, are numbered in the order in
+    which they come. Methods that are not built in take the pairs of `_OTHERS` in turn; from the seventh on these come
+    again, with other fillings.
     """
-    variants: dict[str, dict[str, None]] = {}
-    for row in rows:
-        variants.setdefault(row.method, {})[row.label] = None
-    others = [method for method in variants if method not in _METHODS]
-    styles = {}
-    for method, labels in variants.items():
-        for number, label in enumerate(labels):
-            if method in others:
-                colour, marker = _OTHERS[others.index(method) % len(_OTHERS)]
-                styles[label] = _marker_style(colour, marker, number)
-            else:
-                styles[label] = method_style(method, number)
-    return styles
+    labels: dict[str, dict[str, None]] = {}
+    for method, label in shown:
+        labels.setdefault(method.removesuffix(_HISTORY), {})[label] = None
+    others, pairs = cycle(_OTHERS), dict[str, tuple[str, str]]()
+    for method, several in labels.items():
+        pair = _METHODS.get(method) or next(others)
+        pairs |= dict.fromkeys(several, pair)
+    return _numbered(pairs)
 
 
 @contextmanager
@@ -127,6 +121,15 @@ def page_style() -> Iterator[None]:
 
     with matplotlib.style.context(_SHEETS / "page.mplstyle"):
         yield
+
+
+def _numbered(pairs: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, Any]]:
+    """Return the styles of labels by their colours and markers; labels that share a pair differ by the filling."""
+    variants, styles = Counter[tuple[str, str]](), {}
+    for label, pair in pairs.items():
+        styles[label] = _marker_style(*pair, variants[pair])
+        variants[pair] += 1
+    return styles
 
 
 def _marker_style(colour: str, marker: str, variant: int) -> dict[str, Any]:

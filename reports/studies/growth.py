@@ -84,7 +84,7 @@ def scaling(
 def _draw_scaling(records: list[Scaling], column: str) -> Any:
     """Return the time of a frame over its work, by kind of work, with the fitted exponents and the camera rays."""
     from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS, method_style
+    from reports.plotting.style import WIDTHS, report_styles
     from reports.tables.costs import WORK
 
     kinds = list(dict.fromkeys(record.kind for record in records))
@@ -93,13 +93,14 @@ def _draw_scaling(records: list[Scaling], column: str) -> Any:
     down = -(-len(kinds) // across)
     figure = new_figure(width, (0.42 if double else 0.9) * width * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
+    styles = report_styles((record.label.split()[0], record.label) for record in records)
     for panel, kind in zip(panels, kinds):
         costs: tuple[StepCost, ...] = ()
         for record in (each for each in records if each.kind == kind):
             costs = record.costs
             label = f"{record.label}: power {record.growth['frame'].exponent or math.nan:.2f}"
             times = [cost.frame.median_ms for cost in costs]
-            panel.plot([cost.work for cost in costs], times, label=label, **method_style(record.label.split()[0]))
+            panel.plot([cost.work for cost in costs], times, label=label, **styles[record.label])
         rays = [cost.rays.median_ms for cost in costs]
         panel.plot([cost.work for cost in costs], rays, color="0.6", linestyle=":", label="camera rays")
         panel.set(xscale="log", yscale="log", xlabel=f"{WORK[kind]} [1]", ylabel="time of a frame [ms]")

@@ -78,14 +78,14 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
 def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
     """Return nanoseconds a ray against the error."""
     from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS, kernel_style
+    from reports.plotting.style import WIDTHS, kernel_styles
 
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.9 * width)
     panels = figure.subplots(*((1, 3) if double else (3, 1)), sharex=True, sharey=True)
+    styles = kernel_styles(dict.fromkeys(cost.family for cost in costs))
     for panel, (statistic, title) in zip(panels, _STATISTICS.items()):
-        for family in dict.fromkeys(cost.family for cost in costs):
-            style = kernel_style(family)
+        for family, style in styles.items():
             points = sorted(
                 (cost.time.median, error)
                 for cost in costs

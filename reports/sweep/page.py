@@ -128,7 +128,7 @@ def distribution(said: Summary) -> "Figure | None":
     shown.sort(key=lambda sample: float(np.median(_errors(sample))))
     figure = _figure(0.26 * len(shown) + 1.0)
     panel = figure.subplots()
-    styles = report_styles(said.samples)
+    styles = report_styles((sample.method, sample.label) for sample in said.samples)
     for place, sample in enumerate(shown):
         errors, colour = _errors(sample), styles[sample.label]["color"]
         low, first, middle, third, high = np.quantile(errors, (0.05, 0.25, 0.5, 0.75, 0.95), method="nearest")
@@ -158,7 +158,7 @@ def medians(said: Summary) -> "Figure | None":
         return None
     figure = _figure(4.0 + 0.16 * -(-len(shown) // 3))
     panel = figure.subplots()
-    styles = report_styles(said.samples)
+    styles = report_styles((sample.method, sample.label) for sample in said.samples)
     for sample in shown:
         times, errors = _points(sample)
         (x0, x, x1), (y0, y, y1) = (np.quantile(each, (0.25, 0.5, 0.75), method="nearest") for each in (times, errors))

@@ -6,9 +6,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.methods.registry import METHODS
 from reports.plotting.pictures import error_map, preview, tone_curve, tone_mapped
-from reports.plotting.style import COLOURS, LEAST_DIFFERENCE, method_style
+from reports.plotting.style import COLOURS, LEAST_DIFFERENCE, kernel_styles, report_styles
 
 MAGENTA = (255, 0, 255)
 
@@ -102,12 +102,28 @@ def test_any_two_colours_differ_for_every_sight(sight):
         assert difference > LEAST_DIFFERENCE, (first, other, sight, difference)
 
 
-def test_one_colour_and_one_marker_for_each_method():
-    # No chart has methods for fog and for clouds.
-    clouds = [name for name in METHODS if name not in FOG_METHODS]
-    for names in (clouds, FOG_METHODS):
-        looks = [method_style(name) for name in names]
-        assert len({look["color"] for look in looks}) == len({look["marker"] for look in looks}) == len(names)
-    own = method_style("my_module:fog")
-    assert own == method_style("my_module:fog")
-    assert own["color"] not in {look["color"] for look in looks}
+def looks(styles):
+    return {(look["color"], look["marker"], look["fillstyle"], look["markeredgecolor"]) for look in styles.values()}
+
+
+@pytest.mark.claim("colours-of-figures")
+def test_no_two_labels_of_a_chart_look_alike():
+    """Every built-in method, a variant and its history, three methods of users, a shader and two images of engines."""
+    users = ["mine.py:fog", "fog.glsl", "my_module:fog", "other:fog", "engine", "a"]
+    shown = [(method, method) for method in (*METHODS, *users)]
+    more = [("ray-march", "ray-march (steps=9)"), ("ray-march+history", "history"), ("fog.glsl", "fog (x=1)")]
+    styles = report_styles([*shown, *more])
+    fog = {label: style for label, style in styles.items() if label not in ("cloud-octaves", "cloud-collectors")}
+    assert len(looks(fog)) == len(fog) == len(shown) + 1  # no chart has methods for fog and for clouds
+    # A variant keeps the colour and the marker of its method; methods differ in more than the filling.
+    assert styles["ray-march"]["marker"] == styles["history"]["marker"]
+    methods = [fog[label] for _, label in shown if label in fog]
+    assert len({(look["color"], look["marker"]) for look in methods}) == len(methods)
+    crowd = report_styles([(f"mine.py:{number}", f"{number}") for number in range(72)])
+    assert len(looks(crowd)) == 72
+
+
+def test_no_two_kernels_of_a_chart_look_alike():
+    styles = kernel_styles(["exact", "taylor", "taylor-printed", "quadrature", "mine:a", "mine:b", "mine:c"])
+    assert len(looks(styles)) == 7
+    assert styles["quadrature"] == kernel_styles(["quadrature-32"])["quadrature-32"]
