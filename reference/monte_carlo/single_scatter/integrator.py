@@ -13,6 +13,8 @@ Rounding: a ray's foot and height are computed in double precision; everything a
 the variant's precision. Sums over at most 256 samples are single, over batches double.
 """
 
+from dataclasses import replace
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -48,8 +50,14 @@ def single_scatter_batch(reference: ReferenceScene, seed: int, samples: int) -> 
         # Seeds count up from batch to batch and from chunk to chunk: no two streams share one.
         sampler.seed((seed * chunks + number) % 2**32, count)
         ray = double_ray(mi.Point3d(*(float(c) for c in reference.origin)), mi.Vector3d(reference.direction[chunk].T))
-        layers = ray_light(task, sampler, ray, dr.full(mi.Bool, True, count))
-        dr.eval(layers)
+        layers = dr.zeros(mi.Spectrum, count), dr.zeros(mi.Spectrum, count)
+        # One light after the other: lights of one structure share a compiled kernel, while a kernel of many lights
+        # would hold a loop for each.
+        for source in task.sources:
+            sent = ray_light(replace(task, sources=(source,)), sampler, ray, dr.full(mi.Bool, True, count))
+            layers = layers[0] + sent[0], layers[1] + sent[1]
+            sampler.schedule_state()
+            dr.eval(layers)
         for layer, radiance in enumerate(layers):
             mean[layer, chunk] = np.stack([np.array(c, dtype=np.float64) for c in radiance], axis=1)
     return single_batch(seed, samples, mean)

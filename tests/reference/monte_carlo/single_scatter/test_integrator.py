@@ -3,6 +3,7 @@
 
 from functools import reduce
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -107,3 +108,18 @@ def test_enclosed_light_gives_exactly_zero(variant):
     closed = {"type": "sphere", "center": [0.9, 0.7, 1.9], "radius": 0.21}
     batches = _run(read_reference(_load(shell=closed)), batches=2, samples=16)
     assert np.all(batches.mean == 0)
+
+
+def _kernels(lamps: int) -> set:
+    """The compiled kernels of a batch, by their hashes, in a scene with so many lamps."""
+    more = {f"lamp-{number}": lamp(position=[0.1 * number, 0.8, 1.7]) for number in range(1, lamps)}
+    reference = read_reference(_load(**more))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        single_scatter_batch(reference, 0, 2)
+        return {kernel["hash"] for kernel in dr.kernel_history((dr.KernelType.JIT,))}
+
+
+def test_lamps_share_their_compiled_kernels(variant):
+    """A kernel with a loop for each lamp took minutes to compile for 32 of them, and did not end for 512."""
+    assert _kernels(7) == _kernels(2)
