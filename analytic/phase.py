@@ -124,6 +124,12 @@ class PhaseFunction:
                 )
             object.__setattr__(self, "diameter", diameter)
 
+    @property
+    def _draine(self) -> "HgDraine":
+        """The fit for the diameter, which 'hg-draine' always has."""
+        assert self.diameter is not None
+        return hg_draine_fit(self.diameter)
+
     def __call__(self, cos_scatter: ArrayLike) -> Array:
         """Evaluate at cosines of the scattering angle [1], any shape; the result has the same shape."""
         c = np.asarray(cos_scatter, dtype=np.float64)
@@ -147,7 +153,7 @@ class PhaseFunction:
             base = (1 - g) ** 2 + 4 * g * down if g >= 0 else (1 + g) ** 2 - 4 * g * up
             return (1 - g) * (1 + g) / (base * np.sqrt(base))
         if self.name == "hg-draine":
-            fit = hg_draine_fit(self.diameter or 0.0)
+            fit = self._draine
             first, second = (PhaseFunction("hg", g=g).from_half(down, up) for g in (fit.g_hg, fit.g_d))
             return (1 - fit.weight) * first + fit.weight * second * (1 + fit.alpha * np.square(up - down)) / fit.norm
         if self.name in _DROPLETS:
@@ -171,7 +177,7 @@ class PhaseFunction:
             g = mpf(self.g)
             return (1 - g * g) / (1 + g * g - 2 * g * c) ** mpf("1.5")
         if self.name == "hg-draine":
-            fit = hg_draine_fit(self.diameter or 0.0)
+            fit = self._draine
             first, second = (PhaseFunction("hg", g=g).mp(c) for g in (fit.g_hg, fit.g_d))
             alpha, weight = mpf(fit.alpha), mpf(fit.weight)
             norm = 1 + alpha * (1 + 2 * mpf(fit.g_d) ** 2) / 3
@@ -233,7 +239,7 @@ class PhaseFunction:
             g = self.g
             return [(1 - g * g) * p for p in _power_series(_scaled_plus(c, -2 * g, 1 + g * g), -1.5)]
         if self.name == "hg-draine":
-            fit = hg_draine_fit(self.diameter or 0.0)
+            fit = self._draine
             first, second = (PhaseFunction("hg", g=g).series(degree) or [] for g in (fit.g_hg, fit.g_d))
             square = [math.fsum(c[i] * c[k - i] for i in range(k + 1)) for k in range(degree + 1)]
             rise = _scaled_plus(square, fit.alpha / fit.norm, 1 / fit.norm)

@@ -130,9 +130,10 @@ def _incomparable(old: Scene, new: Scene) -> Finding | None:
     before, after = (scene.reference.mean for scene in (old, new))
     if before is None or after is None:
         return None
-    # Each bound limits the mean absolute error, so the means differ by at most the sum of both bounds.
-    bounds = sum(scene.reference.relative_bound or 0.0 for scene in (old, new))
-    if abs(after - before) > (bounds + FLOORS["mean"]) * abs(before):
+    # Each error is that of the mean absolute value, so the means differ by at most the sum of both. A dark reference
+    # has no relative error: its mean is 0.
+    errors = [each for scene in (old, new) if (each := scene.reference.relative_bound) is not None]
+    if abs(after - before) > (sum(errors) + FLOORS["mean"]) * abs(before):
         words = (
             "the reference moved (mean radiance): another scene by this name, or another reference; errors not compared"
         )
@@ -168,7 +169,7 @@ def _errors(old: Numbers, new: Numbers, *, prefix: str) -> tuple[list[Change], i
             if before is not after:  # JSON writes NaN as null
                 changes.append(("worse" if after is None else "better", what, before, after))
             continue
-        band = error_band(name, before, pixels=old["pixels"], rmse=old.get("relative_rmse") or 0.0)
+        band = error_band(name, before, pixels=old["pixels"], rmse=old["relative_rmse"])
         band += math.hypot(*(each.get(f"{name}_within", 0.0) for each in (old, new)))
         grown = abs(after) - abs(before)
         if abs(grown) > band:

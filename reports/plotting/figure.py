@@ -113,13 +113,15 @@ def speed_panel(
     for entry in filter(has_point, entries):
         assert entry.times
         assert entry.error
-        frame, error = entry.times.frame, entry.error.relative_rmse or 0.0
+        assert entry.error.relative_rmse is not None
+        frame, error = entry.times.frame, entry.error.relative_rmse
         spread = [[frame.median_ms - frame.low_ms], [frame.high_ms - frame.median_ms]]
         style = {**styles[entry.label], "linestyle": "none"}
         if noise := entry.noise:
             error = noise.rmse
             bias = noise.most_bias if noise.root_bias is None else noise.root_bias
-            style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
+            if bias is not None:
+                style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
         points[entry.label] = panel.errorbar([frame.median_ms], [error], xerr=spread, **style).lines[0]
     panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
     panel.set_title(title, parse_math=False)  # a dollar in a file name must not begin a formula

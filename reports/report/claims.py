@@ -20,6 +20,7 @@ from reports.data.records import Claim, Scene
 from reports.tables.agreement import margin_words, verdict, worst_interval
 from reports.tables.costs import WORK, cliffs
 from reports.tables.methods import published_as
+from validation.metrics.errors import known
 from validation.statistics.records import Agreement
 from validation.study.row import Row
 from validation.timing import Scaling
@@ -110,7 +111,7 @@ def _verdict(words: str, compared: list[tuple[str, Agreement]]) -> Claim:
     if good:
         filled = {_place(*pair): worst_interval([pair[1]]) for pair in good}
         place, (worst, most) = max(filled.items(), key=lambda item: item[1][1])
-        low, high = (100 * (end or 0.0) for end in worst.statistics.relative_bias_ci)
+        low, high = (100 * known(end) for end in worst.statistics.relative_bias_ci)
         text = (
             f"The reference is confirmed by {words} in {len(good)} of {len(compared)} comparisons: every 95 % interval "
             f"of the pooled relative bias lies within its margin. The interval that fills most of its margin, "
@@ -142,7 +143,7 @@ def _images(scenes: Scenes) -> Iterator[Claim]:
         what = "total of airlight and surface" if entry.layer == "total" else entry.layer
         text = (
             f"The image {entry.label} of {scene}, judged by its {what}: relative RMSE "
-            f"{100 * error.relative_rmse:.3g} %, relative bias {100 * (error.relative_bias or 0.0):+.3g} %."
+            f"{100 * error.relative_rmse:.3g} %, relative bias {100 * known(error.relative_bias):+.3g} %."
         )
         yield _claim("image", text)
 

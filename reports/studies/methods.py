@@ -309,6 +309,7 @@ def _draw_parts(split: list[Any], column: str) -> Any:
         show_picture(line[1], tone_mapped(reference + parts[0].image, factor), label.replace(" (", "\n("), size)
         for panel, part in zip(line[2:], parts):
             shown = "" if part.fraction is None or part.cause == "whole" else f", {100 * part.fraction:.0f} %"
-            title = f"{part.cause}\n{part.relative_rmse or 0.0:.1e}{shown}"
+            error = "dark" if part.relative_rmse is None else f"{part.relative_rmse:.1e}"
+            title = f"{part.cause}\n{error}{shown}"
             show_picture(panel, error_map(reference, reference + part.image), title, size)
     return figure

@@ -64,9 +64,9 @@ def noise(
         | {
             "label": each.label,
             "bias": each.noise.bias.value,
-            "ms": 1e3 * (each.noise.seconds or 0.0),
+            "ms": None if each.noise.seconds is None else 1e3 * each.noise.seconds,
             "interval": Interval(*each.noise.bias_ci) if each.noise.runs > 1 else None,
-            "noise": math.sqrt(max(each.noise.variance.value or 0.0, 0.0)),
+            "noise": each.noise.deviation.value,
             "until": time_words(each.noise.time_to(_GOAL)),
             "blurred": each.noise.blurred_rmse[middle],
         }
@@ -105,9 +105,10 @@ def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
     panels = figure.subplots(1 + len(noisy), 2, squeeze=False)
     errors, spectra = panels[0]
     for each in found:
-        seconds = each.noise.seconds or 0.0
         steps = [10 ** (k / 8) for k in range(1 + round(8 * math.log10(_MOST)) if each.noise.runs > 1 else 1)]
         style = {} if each.noise.runs > 1 else {"marker": "o", "linestyle": ""}
+        # Without a time there is no place on the axis.
+        seconds = math.nan if each.noise.seconds is None else each.noise.seconds
         errors.plot([seconds * n for n in steps], [each.noise.after(n) for n in steps], label=each.label, **style)
         rings = len(each.noise.spectrum)
         spectra.plot([(k + 0.5) / (2 * rings) for k in range(rings)], each.noise.spectrum, label=each.label)

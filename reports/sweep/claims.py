@@ -46,8 +46,10 @@ class Claim:
     @property
     def fraction_words(self) -> str:
         """The fraction with its interval, and what is not in it, in words."""
-        words = f"in {percent(self.fraction or 0.0, self.tries)} % of {scenes_words(self.tries)}, "
-        words += f"{percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
+        words = "in none, as no scene counts"
+        if self.fraction is not None:
+            words = f"in {percent(self.fraction, self.tries)} % of {scenes_words(self.tries)}, "
+            words += f"{percent(self.low, self.tries)} to {percent(self.high, self.tries)} %"
         if self.undecided:
             words += f"; the reference is not exact enough to tell in {scenes_words(self.undecided)}"
         words += f"; {self.refused} more refused" if self.refused else ""

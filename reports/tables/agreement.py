@@ -56,7 +56,7 @@ def worst_interval(compared: Iterable[Agreement]) -> tuple[Agreement, float]:
 
 def margin_words(statistics: Statistics) -> str:
     """Return the margin of a comparison in words."""
-    return f"±{100 * (statistics.margin or 0.0):g} %"
+    return "no margin" if statistics.margin is None else f"±{100 * statistics.margin:g} %"
 
 
 def trust_table(scenes: Sequence[Scene]) -> Table:

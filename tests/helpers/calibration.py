@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import binom, nct
 
-from validation.statistics.comparison import LEVEL, Estimate, Statistics, compare_statistics
+from validation.statistics.comparison import LEVEL, NoisyImage, Statistics, compare_statistics
 from validation.statistics.samples import student_quantile, uniformity_p
 
 Array = NDArray[np.float64]
@@ -34,11 +34,11 @@ Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers 
 BATCHES, SIZE = 16, (24, 24)  #: of images
 
 
-def monte_carlo(batches: Array) -> Estimate:
+def monte_carlo(batches: Array) -> NoisyImage:
     """Return the estimate that a renderer would give, from its batch means (batches, height, width, ...)."""
     count = len(batches)
     error = batches.std(axis=0, ddof=1) / np.sqrt(count)
-    return Estimate(batches.mean(axis=0), error, count, batches.mean(axis=(1, 2)))
+    return NoisyImage(batches.mean(axis=0), error, count, batches.mean(axis=(1, 2)))
 
 
 def around_one(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
@@ -142,14 +142,14 @@ def _comparisons(experiment: Experiment, bias: float, spread: float) -> list[Sta
     rng = np.random.default_rng(experiment.seed)
     profile = _profile(experiment.size)
 
-    def estimate(image: Array) -> Estimate:
+    def estimate(image: Array) -> NoisyImage:
         noise = spread * experiment.law(rng, (experiment.batches, *image.shape))
         return monte_carlo(image * (1 + noise))
 
     comparisons = []
     for _ in range(experiment.runs):
         test = estimate((1 + bias) * profile)
-        reference = estimate(profile) if experiment.noisy_reference else Estimate(profile)
+        reference = estimate(profile) if experiment.noisy_reference else NoisyImage(profile)
         comparisons.append(compare_statistics(reference, test))
     return comparisons
 

@@ -21,7 +21,7 @@ from validation.metrics.colour import ColourDifference, colour_difference
 from validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
 from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
-from validation.statistics.comparison import LEVEL, Estimate, compare_statistics
+from validation.statistics.comparison import LEVEL, NoisyImage, compare_statistics
 from validation.statistics.records import Statistics
 
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
@@ -159,7 +159,7 @@ def read_mask(path: str | os.PathLike[str]) -> Bools:
     return (values != 0).any(axis=2)
 
 
-def _estimate(path: str, image: Image, name: str) -> Estimate:
+def _estimate(path: str, image: Image, name: str) -> NoisyImage:
     """Take a layer with its standard error out of an image."""
     error = image.layers.get(f"{name}_se")
     batches = image.attributes.get(BATCHES) if error is not None else None
@@ -167,7 +167,7 @@ def _estimate(path: str, image: Image, name: str) -> Estimate:
         raise InputError(
             f"{path} has the attribute {BATCHES} {batches!r}; expected an integer; correct it or remove it"
         )
-    return Estimate(image_layer(image, name, path), error, batches)
+    return NoisyImage(image_layer(image, name, path), error, batches)
 
 
 def statistics_lines(s: Statistics) -> list[str]:

@@ -32,7 +32,7 @@ from reference.scene.shadow_epsilon import measure_shadow_epsilon
 from validation.arrays import Array, Bools
 from validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer
-from validation.statistics.comparison import Estimate, compare_statistics
+from validation.statistics.comparison import NoisyImage, compare_statistics
 from validation.statistics.records import Agreement, Statistics
 
 MASK_PIXELS = 2.0
@@ -142,7 +142,7 @@ def agreements(
     return by_name
 
 
-def reference_estimate(image: ReferenceImage, layer: str, test: Estimate, mask: Bools) -> Estimate:
+def reference_estimate(image: ReferenceImage, layer: str, test: NoisyImage, mask: Bools) -> NoisyImage:
     """Return a layer of a quadrature image as the reference of a comparison of the pixels of a mask with some batches.
 
     Under area lights it has standard errors, of `REPLICATES` scramblings, and the mean over the image of each. A value
@@ -152,12 +152,12 @@ def reference_estimate(image: ReferenceImage, layer: str, test: Estimate, mask: 
     error = reference_error(image, layer)
     reached = np.asarray(test.standard_error) > 0
     if error is None or not error.any():
-        return Estimate(reference_layer(image, layer))
+        return NoisyImage(reference_layer(image, layer))
     values, means = reference_layer(image, layer), None
     if image.replicate_means is not None and mask.all():
         added = image.replicate_means[LAYERS.index(layer)]
         means = values.mean(axis=(0, 1)) + added - added.mean(axis=0)
-    return Estimate(values, np.where(reached, error, 0.0), REPLICATES, means)
+    return NoisyImage(values, np.where(reached, error, 0.0), REPLICATES, means)
 
 
 def _bias(expected: Array, batches: Batches, layer: str, mask: Bools) -> float:
@@ -175,10 +175,10 @@ def layer_mean(batches: Batches, layer: str, mask: Bools) -> Array:
     return batches.mean[LAYERS.index(layer)].reshape(*mask.shape, 3)
 
 
-def batch_estimate(batches: Batches, layer: str, mask: Bools) -> Estimate:
+def batch_estimate(batches: Batches, layer: str, mask: Bools) -> NoisyImage:
     """Return a layer of some batches as one side of a comparison of the pixels of a mask."""
     number = LAYERS.index(layer)
-    return Estimate(
+    return NoisyImage(
         layer_mean(batches, layer, mask),
         batches.standard_error[number].reshape(*mask.shape, 3),
         len(batches.seeds),

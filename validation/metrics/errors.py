@@ -49,13 +49,17 @@ class Metrics:
 class RunsError:
     """Bias and error of a method that draws random numbers, from independent runs, relative to the reference's mean."""
 
-    runs: int = column("runs", "1", "independent renders of the frame")
+    runs: int = column("runs", "1", "independent renders of the frame, each image once")
     bias: float = column("bias", "1", "mean over the runs")
     bias_within: float = column("bias within", "1", "half of the 95 % interval of the bias")
     rmse: float = column("rel. RMSE", "1", "of one run, mean over the runs")
     rmse_within: float = column("RMSE within", "1", "half of the 95 % interval of that mean")
-    root_bias: float | None = column("bias by pixel", "1", "root of the squared bias, where two of its errors above 0")
-    most_bias: float = column("at most", "1", "root of the squared bias and two of its errors")
+    root_bias: float | None = column(
+        "bias by pixel", "1", "root of the squared bias, where its 95 % interval is above 0"
+    )
+    most_bias: float | None = column(
+        "at most", "1", "root of the upper end of that interval; null where fewer than three runs do not tell it"
+    )
 
 
 def error_metrics(reference: ArrayLike, test: ArrayLike, *, mask: ArrayLike | None = None) -> Metrics:

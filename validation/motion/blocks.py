@@ -6,38 +6,15 @@ block. A regression needs only the matrix of the products of a block's columns, 
 these matrices are kept. Blocks are collected in at most `GROUPS` groups, neighbours in different ones.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from validation.arrays import Array
+from validation.statistics.estimate import UNKNOWN, Estimate
+from validation.statistics.samples import widened
 
 BLOCK = 8  #: side of a block [pixels]
 GROUPS = 100  #: their scatter gives a standard error to 7 %
 _SINGULAR = 1e-10  # of the product of its own terms, below which the determinant of a correlation says nothing
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A number and its standard error; None where the frames do not tell it."""
-
-    value: float | None
-    error: float | None = None
-
-    def above(self, errors: float) -> bool:
-        """Return whether the number is above zero by so many standard errors."""
-        return self.value is not None and self.error is not None and self.value > errors * self.error
-
-
-UNKNOWN = Estimate(None)
-
-
-def told(estimate: Estimate, times: float = 1.0) -> str:
-    """Return a number, so many times, and its standard error in words."""
-    if estimate.value is None:
-        return "unknown"
-    error = "" if estimate.error is None else f" +- {times * estimate.error:.2g}"
-    return f"{times * estimate.value:.4g}{error}"
 
 
 def products(columns: Array, side: int = BLOCK) -> Array:
@@ -60,26 +37,34 @@ def products(columns: Array, side: int = BLOCK) -> Array:
 
 
 def regression(sums: Array) -> tuple[Estimate, ...]:
-    """Return the coefficients of the last column on the others; unknown where the columns do not tell them apart."""
+    """Return the coefficients of the last column on the others; unknown where the columns do not tell them apart.
+
+    Their errors are not known where one group alone tells them apart.
+    """
     total = sums.sum(axis=0)
     unknowns = len(total) - 1
-    if not _told_apart(total[:-1, :-1]):
+    if not told_apart(total[:-1, :-1]):
         return (UNKNOWN,) * unknowns
     found = np.linalg.solve(total[:-1, :-1], total[:-1, -1])
     left = total - held(sums)
-    left = left[[_told_apart(each) for each in left[:, :-1, :-1]]]
+    if not all(told_apart(each) for each in left[:, :-1, :-1]):
+        return tuple(Estimate(float(value)) for value in found)
     return estimates(found, np.linalg.solve(left[:, :-1, :-1], left[:, :-1, -1:])[..., 0])
 
 
 def relative_root(sums: Array, value: int, *, to: int, values: int = 0) -> Estimate:
-    """Return the root mean square of a column, counted by column `values`, over the mean of another."""
+    """Return the root mean square of a column, counted by column `values`, over the mean of another, which is positive.
+
+    Its error is not known where one group holds all of that mean: without the group nothing is relative to it.
+    """
     several = _left_out(sums)
     square = several[:, value, value] / np.maximum(several[:, values, values], 1e-300)
     lower = several[:, 0, to]
-    if not (lower > 0).all():
+    lit = lower > 0
+    if not lit[0]:
         return UNKNOWN
-    found = np.sqrt(square) * several[:, 0, 0] / lower
-    return estimates(found[:1], found[1:, None])[0]
+    found = np.sqrt(square[lit]) * several[lit, 0, 0] / lower[lit]
+    return estimates(found[:1], found[1:, None])[0] if lit.all() else Estimate(float(found[0]))
 
 
 def _left_out(sums: Array) -> Array:
@@ -98,12 +83,19 @@ def held(sums: Array) -> Array:
 
 
 def estimates(found: Array, left_out: Array) -> tuple[Estimate, ...]:
-    """Return numbers with the standard errors of the jackknife, from those without each group, (groups, numbers)."""
+    """Return numbers with the errors of the jackknife, from the numbers without each group, (groups, numbers).
+
+    Groups that change nothing, such as dark ones, are no samples. With deviations d of the numbers without a group from
+    their mean, pi/2 (sum |d|)^2 / sum d^2 groups count: all of them where d is normal, hardly more than one where a
+    single group decides. That less one, and at least one, are the degrees of freedom.
+    """
     groups = len(left_out)
     if groups < 2:
         return tuple(Estimate(float(value)) for value in found)
-    spread = ((left_out - left_out.mean(axis=0)) ** 2).sum(axis=0)
-    errors = np.sqrt(spread * (groups - 1) / groups)
+    apart = np.abs(left_out - left_out.mean(axis=0))
+    square = (apart**2).sum(axis=0)
+    counting = np.pi / 2 * apart.sum(axis=0) ** 2 / np.where(square > 0, square, 1.0)
+    errors = widened(np.sqrt(square * (groups - 1) / groups), np.clip(counting - 1, 1.0, groups - 1))
     return tuple(Estimate(float(value), float(error)) for value, error in zip(found, errors, strict=True))
 
 
@@ -118,12 +110,14 @@ def parts_of_error(products: Array) -> tuple[Estimate, Estimate]:
     found = parts(total, own, count)
     if count < 3:
         return Estimate(float(found[0])), Estimate(float(found[1]))
+    # Without run i the sums lack its row and its column.
     diagonal = np.diag(products)
     left_out = parts(total - 2 * products.sum(axis=1) + diagonal, own - diagonal, count - 1)
-    told = estimates(found, left_out)
-    return told[0], told[1]
+    squared_bias, variance = estimates(found, left_out)
+    return squared_bias, variance
 
 
-def _told_apart(matrix: Array) -> bool:
+def told_apart(matrix: Array) -> bool:
+    """Return whether the products of columns tell their coefficients apart."""
     scale = np.sqrt(np.diag(matrix))
     return bool((scale > 0).all()) and bool(np.linalg.det(matrix / np.outer(scale, scale)) > _SINGULAR)

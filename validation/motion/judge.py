@@ -5,15 +5,17 @@
 and of those within a pixel of a lamp. A surface point was disoccluded where it lay outside the frame before, or was
 hidden there: what stood in its pixel was nearer by more than 5 %. Shadows that move are no disocclusion.
 
-**Verdict.** A lag is told where its error is below a quarter of a frame. Frames are late, or early, where only a delay
-is left: nothing persists within four errors, and the delay describes 95 % of what an impulse response does. They lag
-where a lag describes 90 %; what is less is not one lag, and a ghost where light that left is still there by more than
-four errors. Without any of these the error is noise, a factor and an offset.
+**Verdict.** A lag is reported where its error is known and below a quarter of a frame, and where the second-best delay
+is worse by more than four errors. Frames are late, or early, where only a delay is left: nothing persists within four
+errors, and the delay describes 95 % of what an impulse response does. They lag where a lag describes 90 %; what is less
+is not one lag, and a ghost where light that left is still there by more than four errors. Without any of these the
+error is noise, a factor and an offset. A number without an error decides nothing: the verdict then says why.
 """
 
 import math
 import os
 from collections.abc import Mapping
+from collections.abc import Sequence as Several
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,15 +30,18 @@ from validation.arrays import Array, Bools, Index, Progress
 from validation.engine.judge import lamp_distance, relative_bound
 from validation.engine.seen import PIXELS, JudgedLayer, expected_layer, judged_layer, pixel_kinds, scene_of_size
 from validation.estimates.quadrature import reference_image
-from validation.motion.blocks import BLOCK, told
+from validation.motion.blocks import BLOCK
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
+from validation.motion.lag import SURE, Lag
 from validation.motion.measures import AGES, Measures, Sequence, measure
 from validation.scenes.changes import move_shapes, shift_film
 from validation.scenes.loading import load_scene
+from validation.statistics.estimate import Answer, Estimate
+from validation.statistics.samples import UNTOLD_SERIES
 
 _ROUNDING = 1e-6  # relative error of exact frames in files of float32
-_TOLD = 0.25  # largest error of a lag that is told [frames]
-_SURE = 4.0  # errors from which on a number is not zero
+_FACTOR = 1e-5  # relative: a gain nearer to 1 is not worth a word
+_LARGEST_ERROR = 0.25  # of a lag that is reported [frames]: half of one is the distance to the next whole delay
 _ONE_LAG, _ONE_DELAY = 0.9, 0.95  # of what an impulse response describes
 _HIDDEN = 0.95  # of the distance of a point: what stood before it by less hid it
 _POP = 3.0  # times the median change of the error
@@ -86,30 +91,22 @@ class MotionComparison:
             f"{self.expected}, pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
             f"values           {found.values}, {found.nonfinite} not finite; the reference changes by "
             f"{_percent(found.reference_change)} a frame",
-            f"relative RMSE    {told(found.relative_rmse, 100)} %, relative bias {told(found.bias, 100)} %",
-            f"flicker          {told(found.flicker, 100)} % a frame, {told(found.flicker_beside_lag, 100)} % beside "
-            "the lag",
-            f"lag              {told(lag.lag)} frames: delay {told(lag.delay)}, persistence "
-            f"{told(lag.persistence)}, gain {told(lag.gain)}",
-            f"ghost            {told(found.ghost, 100)} % of the light that left in {AGES} frames"
-            + (
-                ""
-                if found.trail_rmse is None
-                else f"; its trail, {_percent(found.trail_fraction)} of the values, is {_percent(found.trail_rmse)} off"
-            ),
+            f"relative RMSE    {found.relative_rmse.percent()}, relative bias {found.bias.percent()}",
+            f"flicker          {found.flicker.percent()} a frame, {found.flicker_beside_lag.percent()} beside the lag",
+            f"lag              {lag.lag.words()} frames: delay {_delay_words(lag)}, persistence "
+            f"{lag.persistence.words()}, gain {lag.gain.words()}",
+            f"ghost            {found.ghost.percent()} of the light that left in {AGES} frames",
         ]
         if found.pop is not None:
             words = "a pop" if found.pop >= _POP else "no pop"
             lines.append(
                 f"largest change   of the error in frame {found.pop_frame}, {found.pop:.3g} times the median: {words}"
             )
-        if found.convergence is not None:
-            lines.append(f"at rest          within 5 % of the floor after {_frames(found.convergence)}")
         for name, each in self.masks.items():
             if name != "all":
                 lines.append(
-                    f"{name:16} {each.values} values: relative RMSE {told(each.relative_rmse, 100)} %, flicker "
-                    f"{told(each.flicker, 100)} %, lag {told(each.lag.lag)}, ghost {told(each.ghost, 100)} %"
+                    f"{name:16} {each.values} values: relative RMSE {each.relative_rmse.percent()}, flicker "
+                    f"{each.flicker.percent()}, lag {each.lag.lag.words()}, ghost {each.ghost.percent()}"
                 )
         shifts = ", ".join(f"{shift:+d}: {_percent(error)}" for shift, error in self.shifts.items())
         lines += [f"shifted          {shifts} off the reference so many frames before"] if shifts else []
@@ -149,6 +146,8 @@ def compare_frames(
             if progress is not None:
                 progress(0.8 * n / record.frames, f"the reference of frame {n}")
             frames.expect(n)
+        if min(frames.nonfinite) == judged.values.size:
+            raise InputError(f"{pattern}: no frame has a finite value: all are NaN or infinite")
         if progress is not None:
             progress(0.8, "measures")
         masks = {name: measured for name in frames.masks if (measured := measure(frames.sequence(name))) is not None}
@@ -163,10 +162,15 @@ def compare_frames(
     if NOTE in first.attributes:
         notes += (f"{paths[0]}: {first.attributes[NOTE]}",)
     found = masks["all"]
-    lag, bias = found.lag.lag.value, found.bias
-    failures = [f"{found.nonfinite} values are NaN or infinite"] if found.nonfinite else []
-    if margin is not None and bias.value is not None and abs(bias.value) + 2 * (bias.error or 0.0) > margin:
-        failures.append(f"the relative bias is not shown to be within +-{margin:.3g}")
+    lag = found.lag.lag.value
+    verdict = motion_verdict(found, frames.reference_error)
+    failures = []
+    if any(frames.nonfinite):
+        wrong = [f"{n} ({path.name})" for n, path in enumerate(paths) if frames.nonfinite[n]]
+        failures.append(f"{sum(frames.nonfinite)} values are NaN or infinite, in frames {_listed(wrong)}")
+    if margin is not None and verdict.kind != "exact" and found.bias.within(margin) is not Answer.YES:
+        why = "" if found.bias.error is not None else f": {UNTOLD_SERIES}"
+        failures.append(f"the relative bias is not shown to be within +-{margin:.3g}{why}")
     return MotionComparison(
         scene=scene,
         files=str(pattern),
@@ -177,7 +181,7 @@ def compare_frames(
         pixel=kinds[0],
         reference_error=frames.reference_error,
         masks=masks,
-        verdict=motion_verdict(found, frames.reference_error),
+        verdict=verdict,
         lag_ms=None if lag is None or record.fps is None else 1000 * lag / record.fps,
         shifts=shifts,
         notes=notes,
@@ -191,6 +195,7 @@ class _Frames:
     def __init__(self, folder: Path, scene: str, record: FramesRecord, judged: JudgedLayer, pixel: str) -> None:
         self._folder, self._scene, self._record, self._judged, self._pixel = folder, scene, record, judged, pixel
         self.reference_error = 0.0
+        self.nonfinite: list[int] = []  # values of each frame that are NaN or infinite
         shape = (record.frames, *judged.values.shape[:2])
         self._uncovered, self._beside = np.zeros((2, *shape), dtype=bool)
         self._ages = np.full(shape[1:], math.inf)  # of the last frame, since a point was disoccluded
@@ -204,6 +209,7 @@ class _Frames:
         if values.shape != self._judged.values.shape:
             sizes = [" x ".join(str(side) for side in each.shape[1::-1]) for each in (values, self._judged.values)]
             raise InputError(f"frame {n}: {path} has {sizes[0]} pixels, the first frame {sizes[1]}")
+        self.nonfinite.append(int((~np.isfinite(values)).sum()))
         np.save(self._folder / f"frame-{n}.npy", values.astype(np.float64) / 2 ** self._record.stops(n))
 
     def expect(self, n: int) -> None:
@@ -293,7 +299,8 @@ def _shifts(sequence: Sequence) -> dict[int, float]:
         light += float(sequence.reference(n).mean())
         for shift in shifts:
             error = frame - sequence.reference(n - shift)
-            sums[shift] += float(np.mean(error[np.isfinite(error)] ** 2))
+            finite = error[np.isfinite(error)]
+            sums[shift] += float(np.mean(finite**2)) if finite.size else 0.0
     if not light:
         return {}
     return {shift: math.sqrt(sums[shift] * len(frames)) / light for shift in shifts}
@@ -301,51 +308,88 @@ def _shifts(sequence: Sequence) -> dict[int, float]:
 
 def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVerdict:
     """Return the verdict on a sequence from its measures, see the module."""
-    rmse = measures.relative_rmse.value or 0.0
-    if rmse <= max(_ROUNDING, 3 * reference_error):
+    # The RMSE of these frames is a fact: only what the reference does not know itself stands between it and zero.
+    rmse = measures.relative_rmse.value
+    if rmse is not None and rmse <= max(_ROUNDING, 3 * reference_error):
         return MotionVerdict("exact", f"exact: relative RMSE {rmse:.2g}")
+
+    # Nothing is said of a filter whose numbers have no errors, or large ones.
     lag, persistence, delay = measures.lag.lag, measures.lag.persistence, measures.lag.delay
-    noise = (measures.flicker_beside_lag.value or 0.0) / math.sqrt(2)
-    if lag.value is None or lag.error is None or lag.error > _TOLD or (delay.error or 0.0) > _TOLD:
-        return MotionVerdict(
-            "cannot be told",
-            f"no lag can be told: the reference changes by {_percent(measures.reference_change)} a frame, the noise is "
-            f"{_percent(noise)}",
-        )
-    assert persistence.value is not None
-    assert delay.value is not None
-    kept = abs(persistence.value) > max(_SURE * (persistence.error or 0.0), _ROUNDING)
-    described = measures.lag.described if measures.lag.described is not None else 1.0
-    if delay.value and not kept and described > _ONE_DELAY:
-        words = "late" if delay.value > 0 else "early"
-        return MotionVerdict("late", f"the frames are {words} by {_frames(abs(delay.value))}")
-    if (kept or delay.value) and described >= _ONE_LAG:
-        constant = measures.lag.time_constant.value
-        after = "" if constant is None else f"; what is missing of a change falls as exp(-n/{constant:.3g})"
-        return MotionVerdict("lag", f"the frames lag by {lag.value:.4g} +- {lag.error:.2g} frames{after}")
-    if measures.ghost.above(_SURE):
-        ages = [each.value or 0.0 for each in measures.ghost_by_age]
+    beside = measures.flicker_beside_lag.value
+    noise = "noise beside it is unknown" if beside is None else f"noise of {_percent(beside / math.sqrt(2))}"
+    if beside is not None and beside <= _ROUNDING:
+        noise = "no noise beyond rounding"
+    if reason := _undecided(measures):
+        return MotionVerdict("cannot be told", f"no lag can be told: {reason}; {noise}")
+
+    # One filter explains the frames: a delay, or a delay and a history.
+    persists = persistence.within(_ROUNDING, SURE) is Answer.NO
+    filtered = persists or bool(delay)
+    apart = measures.lag.delay_margin.exceeds(0.0, SURE) is Answer.YES
+    # Frames that are early have light that no response to earlier light explains.
+    described = 1.0 if delay is not None and delay < 0 else measures.lag.described
+    if filtered and apart and described is not None:
+        if delay and not persists and described > _ONE_DELAY:
+            words = "late" if delay > 0 else "early"
+            return MotionVerdict("late", f"the frames are {words} by {_frames(abs(delay))}")
+        if described >= _ONE_LAG:
+            constant = measures.lag.time_constant.value
+            after = "" if constant is None else f"; what is missing of a change falls as exp(-n/{constant:.3g})"
+            return MotionVerdict("lag", f"the frames lag by {lag.words()} frames{after}")
+
+    # Light is still there, but no one filter keeps it.
+    if measures.ghost.value is not None and measures.ghost.exceeds(0.0, SURE) is Answer.YES:
         return MotionVerdict(
             "ghost",
-            f"a ghost: {_percent(measures.ghost.value or 0.0)} of the light that left a place is still there"
-            + (f"; the impulse response is largest {_oldest(measures)} after it" if ages else ""),
+            f"a ghost: {_percent(measures.ghost.value)} of the light that left a place is still there; the impulse "
+            f"response is largest {_oldest(measures)} after it",
         )
-    if kept or delay.value:
+    if filtered and described is not None and described < _ONE_LAG:
         return MotionVerdict(
             "not one lag",
             f"not one lag: it describes {_percent(described)} of what the frames keep of earlier ones; see the impulse "
             "response",
         )
-    gain = measures.lag.gain
-    factor = ""
-    if gain.value is not None and abs(gain.value - 1) > max(_SURE * (gain.error or 0.0), 1e-5):
+    if filtered or not apart:
+        reason = f"the delay is not told from the second best: {_delay_words(measures.lag)}"
+        if apart:
+            reason = "what the frames hold of earlier ones is rounding"
+        return MotionVerdict("cannot be told", f"no lag can be told: {reason}; {noise}")
+
+    # What is left is noise and a factor.
+    gain, factor = measures.lag.gain, ""
+    if gain.value is not None and Estimate(gain.value - 1, gain.error).within(_FACTOR, SURE) is Answer.NO:
         factor = f", and a factor of {gain.value:.5g}"
-    return MotionVerdict("noise", f"no lag: noise of {_percent(noise)}{factor}")
+    return MotionVerdict("noise", f"no lag: {noise}{factor}")
+
+
+def _undecided(measures: Measures) -> str:
+    """Return why the numbers of a lag say nothing; empty where they do."""
+    lag = measures.lag
+    if lag.lag.value is None:
+        return f"the reference changes by {_percent(measures.reference_change)} a frame"
+    if lag.lag.error is None or lag.persistence.error is None:
+        return f"all light is in one block of {BLOCK} x {BLOCK} pixels, so that nothing says how sure its numbers are"
+    if lag.lag.error > _LARGEST_ERROR:
+        return f"its error is {_frames(lag.lag.error)}, the reference changes by {_percent(measures.reference_change)}"
+    return ""
+
+
+def _delay_words(lag: Lag) -> str:
+    """Return a delay, and by how much the second-best one is worse, in errors of that."""
+    margin = lag.delay_margin
+    if lag.delay is None:
+        return "unknown"
+    if margin.value is None or margin.error is None:
+        return f"{lag.delay} (nothing says how sure)"
+    if margin.error <= _ROUNDING * margin.value:
+        return str(lag.delay)
+    return f"{lag.delay} (the second best is worse by {margin.value / margin.error:.3g} errors)"
 
 
 def _oldest(measures: Measures) -> str:
-    response = [each.value or 0.0 for each in measures.lag.response]
-    return _frames(1 + int(np.argmax(response[1:]))) if len(response) > 1 else "some frames"
+    response = [math.nan if each.value is None else each.value for each in measures.lag.response[1:]]
+    return _frames(1 + int(np.nanargmax(response))) if np.isfinite(response).any() else "some frames"
 
 
 def _frames(count: float) -> str:
@@ -356,6 +400,6 @@ def _percent(value: float) -> str:
     return f"{100 * value:.3g} %"
 
 
-def _listed(numbers: tuple[int, ...]) -> str:
-    shown = ", ".join(map(str, numbers[:5]))
-    return shown if len(numbers) <= 5 else f"{shown} and {len(numbers) - 5} more"
+def _listed(each: Several[object]) -> str:
+    shown = ", ".join(map(str, each[:5]))
+    return shown if len(each) <= 5 else f"{shown} and {len(each) - 5} more"

@@ -13,6 +13,11 @@ bias looks like a lag.
 **Which lag there is, if any.** The impulse response is the best t_n = c m + sum of h_k r_(n-k), k from 0 to 15, h >= 0.
 `described` is the improvement of a lag over no filter, as a fraction of the improvement of the impulse response.
 
+**Which delay.** It is whole, so it has no standard error: leaving out a block moves it by nothing or by a whole frame.
+What can be told is by how much the second-best delay is worse, each with the persistence that suits it best:
+`delay_margin` is the fraction of the sum of squares of the second-best delay that the best one does not leave, with its
+error from blocks.
+
 Squares count with 1/(r + 0.1 m)^2, r the mean of a value in time: otherwise a few bright pixels rule. Filters in time
 commute with means over pixels, so means over cells of 4 x 4 pixels are fitted.
 """
@@ -25,7 +30,8 @@ import numpy as np
 from scipy.optimize import lsq_linear, minimize_scalar
 
 from validation.arrays import Array
-from validation.motion.blocks import BLOCK, UNKNOWN, Estimate, estimates, held, products
+from validation.motion.blocks import BLOCK, estimates, held, products, told_apart
+from validation.statistics.estimate import UNKNOWN, Answer, Estimate
 
 CELL = 4  #: side of a cell [pixels]
 TAPS = 16  #: of the impulse response [frames]
@@ -35,6 +41,7 @@ _LEAST, _MOST = -0.5, 0.9995  # persistence: below zero a filter that sharpens i
 _MOVES = 1e-12  # relative square of a change, below which it is rounding
 _SEARCHED = 20_000  # values that choose the delay
 _STARTS = (-0.3, 0.0, 0.3, 0.6, 0.8, 0.9, 0.95, 0.98)
+SURE = 4.0  #: errors from which on a number of a sequence is not zero: by chance in less than one of 10 000
 
 
 @dataclass(frozen=True)
@@ -55,11 +62,19 @@ class Lag:
     offset: Estimate = UNKNOWN
     gain: Estimate = UNKNOWN
     persistence: Estimate = UNKNOWN
-    delay: Estimate = UNKNOWN  #: [frames]
+    delay: int | None = None  #: whole [frames]
+    delay_margin: Estimate = UNKNOWN  #: fraction of what the second-best delay leaves that this one does not
     described: float | None = None  #: fraction of what an impulse response explains; None where the lag may be zero
     response: tuple[Estimate, ...] = ()  #: of a flash, by frame after it
     lag: Estimate = UNKNOWN  #: mean age of the light that is shown [frames]
     time_constant: Estimate = UNKNOWN  #: frames after which 1/e of a step is missing; unknown where nothing persists
+
+    @property
+    def filter(self) -> tuple[float, float, float, int]:
+        """Offset, gain, persistence and delay; what is not known is that of frames without a filter."""
+        without = ((self.offset, 0.0), (self.gain, 1.0), (self.persistence, 0.0))
+        offset, gain, persistence = (usual if each.value is None else each.value for each, usual in without)
+        return offset, gain, persistence, 0 if self.delay is None else self.delay
 
 
 def filtered_frames(
@@ -80,25 +95,47 @@ def fit_lag(cells: Cells) -> Lag:
         return Lag()
     tried = [_best_persistence(few, delay) for delay in DELAYS]
     left = np.array([_left(few, persistence, delay) for persistence, delay in zip(tried, DELAYS, strict=True)])
-    best = int(np.argmin(left.sum(axis=1)))
-    without = np.argmin(left.sum(axis=1, keepdims=True) - left, axis=0)
-    delay = estimates(np.array([DELAYS[best]]), np.array([[DELAYS[each]] for each in without]))[0]
-    persistence = _polished(cells, tried[best], DELAYS[best])
-    sums = _sums(cells, persistence, DELAYS[best])
-    offset, gain, kept = _jackknife(sums, persistence)
-    if kept.value is None:
+    best, second = (int(place) for place in np.argsort(left.sum(axis=1))[:2])
+    delay = DELAYS[best]
+    found_persistence = _polished(cells, tried[best], delay)
+    sums = _sums(cells, found_persistence, delay)
+    offset, gain, persistence = _jackknife(sums, found_persistence)
+    if persistence.value is None:
         return Lag(offset, gain)
     response, described = _impulse_response(cells, _cost(sums.sum(axis=0)))
-    told = delay.value != 0 or abs(kept.value) > 4 * (kept.error or 0.0)
-    age = Estimate(DELAYS[best] + kept.value / (1 - kept.value), _times(kept.error, 1 / (1 - kept.value) ** 2))
-    return Lag(offset, gain, kept, delay, described if told else None, response, age, _time_constant(kept))
+    filtered = delay != 0 or persistence.within(0.0, SURE) is Answer.NO
+    kept = persistence.value / (1 - persistence.value)
+    return Lag(
+        offset,
+        gain,
+        persistence,
+        delay,
+        _margin(left[best], left[second]),
+        described if filtered else None,
+        response,
+        Estimate(delay + kept, _times(persistence.error, 1 / (1 - persistence.value) ** 2)),
+        _time_constant(persistence),
+    )
 
 
-def _time_constant(kept: Estimate) -> Estimate:
-    if kept.value is None or not 1e-6 < kept.value < 1 or not kept.above(2):
+def _margin(best: Array, second: Array) -> Estimate:
+    """Return the fraction of the squares of the second-best delay that the best one does not leave, (groups,) each."""
+    groups = np.stack([best, second])
+    groups = groups[:, groups.any(axis=0)]
+    total = groups.sum(axis=1, keepdims=True)
+    left_out = total - groups
+    if total.min() < 0 or total[1, 0] <= 0 or left_out[1].min(initial=np.inf) <= 0:
+        return UNKNOWN  # nothing is left to compare, or in one group alone
+    fraction, without = (1 - each[0] / each[1] for each in (total, left_out))
+    return estimates(fraction, without[:, None])[0]
+
+
+def _time_constant(persistence: Estimate) -> Estimate:
+    a = persistence.value
+    if a is None or not 1e-6 < a < 1 or persistence.exceeds(0.0) is not Answer.YES:
         return UNKNOWN
-    rate = math.log(kept.value)
-    return Estimate(-1 / rate, _times(kept.error, 1 / (kept.value * rate**2)))
+    rate = math.log(a)
+    return Estimate(-1 / rate, _times(persistence.error, 1 / (a * rate**2)))
 
 
 def _times(error: float | None, slope: float) -> float | None:
@@ -198,7 +235,11 @@ def _jackknife(sums: Array, persistence: float) -> tuple[Estimate, Estimate, Est
     groups = held(sums)
     gradient = scale * (groups[:, :unknowns, 3] - groups[:, :unknowns, :2] @ linear)  # by group; their sum is zero
     matrix = (total - groups)[:, :unknowns, :unknowns] * np.outer(scale, scale)
-    told = estimates(found, found - np.einsum("gij,gj->gi", np.linalg.pinv(matrix, hermitian=True), gradient))
+    if all(told_apart(each) for each in matrix):
+        left_out = found - np.linalg.solve(matrix, gradient[..., None])[..., 0]
+    else:
+        left_out = found[None]  # one group alone tells them: their errors are not known
+    told = estimates(found, left_out)
     return told[0], told[1], told[2] if moves else UNKNOWN
 
 

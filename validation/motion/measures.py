@@ -4,22 +4,18 @@
 With r_n the reference of frame n, t_n the frame, e = t - r, and m the mean of r over all values that count:
 
 - relative RMSE: the root mean square of e, over m;
-- relative bias: the mean of e over m. It has an error only where the means of the frames are independent: from an
-  autocorrelation of 3 over the root of their number on they are not, and several runs of the sequence are needed;
+- relative bias: the mean of e over m. Its error is that of the mean of a series of frames that may depend on those
+  before them (`validation.statistics.samples.mean_of_series`); fewer than eight frames tell none;
 - flicker: the root mean square of e_n - e_(n-1), over m: it leaves out the change of the reference. Flicker beside the
   lag: the same for t - c m - g y, the part that no lag explains (`validation.motion.lag`);
 - ghost: light that left a place in the last twelve frames is w = max(r_(n-12) .. r_n) - r_n; the fraction G of it that
   is still there is a coefficient of e = c m + b r + G w. By age k, w is max(r_(n-k) - r_n, 0);
-- trail: the error where w is above 0.05 m;
-- pop: the largest root mean square of e_n - e_(n-1) of a frame, over the median of all frames;
-- convergence at rest: after how many frames of a history, while the reference does not change, the error is within 5 %
-  of the floor that it reaches.
+- pop: the largest root mean square of e_n - e_(n-1) of a frame, over the median of all frames.
 
 Pairs of frames across the beginning of a history do not count. A sequence that does not begin with one has frames that
 only start the filter. Values that are not finite are counted, and left out: there the frame is taken for its reference.
 """
 
-import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -29,17 +25,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from validation.arrays import Array, Bools
-from validation.motion.blocks import UNKNOWN, Estimate, products, regression, relative_root
+from validation.motion.blocks import products, regression, relative_root
 from validation.motion.lag import CELL, DARK, Cells, Lag, filtered_frames, fit_lag
 from validation.statistics.comparison import block_sums
+from validation.statistics.estimate import UNKNOWN, Estimate
+from validation.statistics.samples import mean_of_runs, mean_of_series
 
 _Record = TypeVar("_Record", "Measures", Lag)
 
 AGES = 12  #: of light that left [frames]
 STARTING = 16  #: frames that only start the filter of a sequence without a first reset
-_TRAIL = 0.05  # of the mean: light that left, from which on a value belongs to a trail
-_FLOOR = 1.05  # of the error at rest, within which it is reached
-_RESTING = 8  # frames at rest after a reset, of which convergence is told
 
 
 @dataclass(frozen=True)
@@ -81,11 +76,8 @@ class Measures:
     lag: Lag
     ghost: Estimate
     ghost_by_age: tuple[Estimate, ...]  #: from one frame on
-    trail_rmse: float | None
-    trail_fraction: float  #: of the values
     pop: float | None  #: ratio to the median
     pop_frame: int | None
-    convergence: int | None  #: frames after a reset; None where the reference moves
     rmse_by_frame: tuple[float, ...]
     change_by_frame: tuple[float, ...]  #: of the reference
     repeated: tuple[int, ...]  #: frames that are the one before, bit by bit, though the reference moved
@@ -101,21 +93,28 @@ def measure(sequence: Sequence) -> Measures | None:
 
 
 def mean_measures(runs: list[Measures]) -> Measures:
-    """Return the means over runs of what has an error, with errors from their spread; the rest is that of the first."""
-    return runs[0] if len(runs) == 1 else replace(_means(runs), lag=_means([each.lag for each in runs]))
+    """Return the means over runs of what has an error, with errors from their spread.
+
+    What one run does not tell is unknown of their mean, and so is a delay in which runs differ. Values that are not
+    finite are those of all runs; the rest is that of the first.
+    """
+    if len(runs) == 1:
+        return runs[0]
+    lags = [each.lag for each in runs]
+    lag = _means(lags)
+    if len({each.delay for each in lags}) > 1:
+        lag = replace(lag, delay=None, delay_margin=UNKNOWN)
+    return replace(_means(runs), lag=lag, nonfinite=sum(each.nonfinite for each in runs))
 
 
 def _means(records: list[_Record]) -> _Record:
-    found: dict[str, Any] = {}
+    means: dict[str, Any] = {}
     for each in fields(records[0]):
         several = [getattr(record, each.name) for record in records]
         if isinstance(several[0], Estimate):
             values = [estimate.value for estimate in several]
-            if None not in values:
-                found[each.name] = Estimate(
-                    float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(len(values)))
-                )
-    return replace(records[0], **found)
+            means[each.name] = UNKNOWN if None in values else mean_of_runs(values)
+    return replace(records[0], **means)
 
 
 class _FirstPass:
@@ -177,38 +176,34 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
     """Return the measures: those that need the mean in time, and the lag, are summed here."""
     mean = first.mean
     scale = 1 / (first.brightness + DARK * mean)
-    offset, gain = (lag.offset.value or 0.0) * mean, 1.0 if lag.gain.value is None else lag.gain.value
-    persistence = min(max(lag.persistence.value or 0.0, 0.0), 1.0)
+    offset, gain, persistence, delay = lag.filter
     shown_light = filtered_frames(
-        sequence.reference, sequence.frames, sequence.start, persistence, int(lag.delay.value or 0)
+        sequence.reference, sequence.frames, sequence.start, min(max(persistence, 0.0), 1.0), delay
     )
     window: deque[Array] = deque(maxlen=AGES + 1)
     left: Array = np.zeros(())
     ghosts: Array = np.zeros(())
     beside: Array = np.zeros(())
-    trail = np.zeros(2)
     for n, light in enumerate(shown_light):
         if n == sequence.start[n]:
             window.clear()
         reference, frame = sequence.reference(n), sequence.frame(n)
         window.append(reference.astype(np.float32))  # what ghosts are sums of: half of the memory and time
         frame = np.where(np.isfinite(frame), frame, reference)
-        before, left = left, frame - offset - gain * light
+        before, left = left, frame - offset * mean - gain * light
         if not sequence.counts(n):
             continue
         one = np.where(sequence.selected(n)[..., None], 1.0, 0.0) + np.zeros(3)
         if sequence.pair_counts(n):
             beside = beside + products(np.stack([one, (left - before) * one, reference * one]))
-        error, here, count = frame - reference, window[-1], len(window)
+        here, count = window[-1], len(window)
         columns = np.empty((AGES + 4, *here.shape), np.float32)
-        columns[0], columns[1], columns[-1] = mean, here, error
+        columns[0], columns[1], columns[-1] = mean, here, frame - reference
         for age in range(1, AGES + 1):
             columns[2 + age] = np.maximum(window[max(count - 1 - age, 0)] - here, 0)
-        most = columns[2] = columns[3:-1].max(axis=0)
+        columns[2] = columns[3:-1].max(axis=0)
         columns *= one * scale
         ghosts = ghosts + products(columns).astype(np.float64)
-        there = one * (most > _TRAIL * mean)
-        trail += [there.sum(), (there * error**2).sum()]
     total = first.sums.sum(axis=0)
     by_frame = np.array(first.frame_sums)
     pairs = by_frame[:, 3, 3] > 0
@@ -232,13 +227,8 @@ def _second_pass(sequence: Sequence, first: _FirstPass, lag: Lag) -> Measures:
         ghost_by_age=tuple(
             regression(ghosts[:, [0, 1, 2 + age, -1]][:, :, [0, 1, 2 + age, -1]])[2] for age in range(1, AGES + 1)
         ),
-        trail_rmse=math.sqrt(trail[1] / trail[0]) / mean if trail[0] else None,
-        trail_fraction=float(trail[0] / total[0, 0]),
         pop=float(jumps.max() / median) if median > 0 else None,
         pop_frame=counted[places[int(np.argmax(jumps))]] if median > 0 else None,
-        convergence=_convergence(
-            sequence, dict(zip(counted, rmse, strict=True)), dict(zip(counted, moved, strict=True))
-        ),
         rmse_by_frame=tuple(rmse.tolist()),
         change_by_frame=tuple(moved.tolist()),
         repeated=tuple(first.repeated),
@@ -251,27 +241,8 @@ def _cell_means(values: Array) -> Array:
 
 
 def _bias(by_frame: Array) -> Estimate:
-    """Return the mean error over the mean reference; its error only where the means of frames are independent."""
+    """Return the mean error over the mean reference, with the error of the mean of the frames."""
     light = by_frame[:, 0, 2]
-    value = float(by_frame[:, 0, 1].sum() / light.sum())
     lit = light > 0
-    means = by_frame[lit, 0, 1] / light[lit]
-    count = len(means)
-    apart = means - means.mean()
-    square = float(apart @ apart)
-    if count < 3 or square == 0.0 or abs(apart[1:] @ apart[:-1]) > 3 / math.sqrt(count) * square:
-        return Estimate(value, 0.0 if count >= 3 and square == 0.0 else None)
-    return Estimate(value, math.sqrt(square / (count - 1) / count))
-
-
-def _convergence(sequence: Sequence, rmse: dict[int, float], moved: dict[int, float]) -> int | None:
-    """Return how many frames after the first reset at rest the error is within 5 % of its floor."""
-    for reset in sequence.resets:
-        last = reset
-        while last + 1 in rmse and sequence.start[last + 1] == reset and moved[last + 1] == 0.0:
-            last += 1
-        errors = [rmse[n] for n in range(reset, last + 1) if n in rmse]
-        if len(errors) >= _RESTING:
-            floor = float(np.median(errors[-len(errors) // 4 :]))
-            return next(n for n, error in enumerate(errors) if error <= _FLOOR * floor)
-    return None
+    series = mean_of_series(by_frame[lit, 0, 1] / light[lit])
+    return Estimate(float(by_frame[:, 0, 1].sum() / light.sum()), series.error)

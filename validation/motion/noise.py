@@ -12,6 +12,12 @@ mean of the reference, and G_ij the mean of e_i e_j over values,
 
 Errors of V and b^2 come from leaving out one run at a time. N runs averaged have the error sqrt(b^2 + V/N).
 
+**Whether the runs are independent.** Runs of one seed are the same, bit by bit: each image counts once. Runs that share
+a part of their random numbers, or of their history, have noise that is correlated: of N independent ones the noise n_i
+has the correlation -1/(N - 1) between two runs, as the mean over runs is taken away. A pair that exceeds it by more
+than a tenth, and that by four errors from blocks of pixels, is no pair of independent runs: no bias and no average is
+reported then. What all runs share alike is no noise, but bias.
+
 **Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that a few runs may have
 none: their mean is then too dark and their spread too small. For a sum of independent deviations x with skewness g =
 sum of x^3 over (sum of x^2)^(3/2), an interval of 95 % lies below the mean in 2.5 % + 0.084 g of all cases, by the
@@ -44,15 +50,19 @@ from validation.arrays import Array, Progress
 from validation.engine.images import image_times
 from validation.engine.judge import fitting_kind, references, relative_bound
 from validation.engine.seen import expected_layer, judged_layer, pixel_kinds, scene_of_size
-from validation.motion.blocks import Estimate, parts_of_error, told
-from validation.statistics.samples import student, student_quantile
+from validation.motion.blocks import estimates, parts_of_error, products
+from validation.motion.lag import SURE
+from validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
+from validation.statistics.samples import first_equal, mean_of_runs, student, student_quantile
 
 RINGS = 8  #: of the error spectrum, from 0 to 1/2 cycle a pixel
 BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]
-GOALS = (0.05, 0.01, 0.002)  #: relative errors whose time is told
+GOALS = (0.05, 0.01, 0.002)  #: relative errors whose time is reported
 _LOW = 0.125  # cycles a pixel
+_SHARED = 0.1  # correlation of two runs: ten that share as much are worth five, as 10/(1 + 9/10) is 5.3
 _DOUBTFUL = 0.01  # of the sum of squares: a single value from which on the interval may not hold, see the module
-_NO_NOISE = Estimate(0.0, 0.0)
+_NO_NOISE = fact(0.0)
+_NAMED = 5  # files that a sentence names
 _POWER, _LEVEL = 0.9, 0.05  # with which a bias is detected
 
 
@@ -60,7 +70,7 @@ _POWER, _LEVEL = 0.9, 0.05  # with which a bias is detected
 class Noise:
     """The noise of independent renders of a frame; all is relative to the mean of the reference."""
 
-    runs: int
+    runs: int  #: of different images
     bias: Estimate
     bias_ci: tuple[float, float]  #: 95 %
     detectable_bias: float = 0.0  #: that would be found nine times of ten
@@ -77,13 +87,28 @@ class Noise:
     root_bias: float | None = None  #: the root of the squared bias, where it is above zero by two errors
     efficiency: float | None = None  #: 1/(V T), which stays where samples and time are both doubled [1/s]
     seconds_to: Mapping[float, float | None] = field(default_factory=dict)  #: by error, see `time_to`
+    correlated: tuple[tuple[int, int], ...] = ()  #: pairs of runs whose noise is
     verdict: str = ""  #: on bias and noise, in words
+
+    @property
+    def deviation(self) -> Estimate:
+        """The standard deviation of a run, over its pixels."""
+        variance, error = self.variance.value, self.variance.error
+        if variance is None or variance <= 0:
+            return fact(0.0) if variance == 0 else UNKNOWN
+        root = math.sqrt(variance)
+        return Estimate(root, None if error is None else error / (2 * root), self.variance.kind)
 
     def words(self) -> str:
         """Return the verdict on bias and noise."""
         low, high = (100 * end for end in self.bias_ci)
         if self.runs == 1:
             return f"no random numbers: all of its error is bias, {low:+.3g} % in the mean"
+        if self.correlated:
+            return (
+                "whether there is a bias cannot be told: runs are not independent, and averages of them have another "
+                "error; expected renders with different seeds and no history"
+            )
         if (
             self.largest_fraction > _DOUBTFUL
             and not min(low * self.largest_deviation, high * self.largest_deviation) > 0
@@ -95,31 +120,37 @@ class Noise:
             )
         if low <= 0 <= high and self.root_bias is None:
             return f"no bias in {self.runs} runs; one of {100 * self.detectable_bias:.2g} % would have been found"
-        if low <= 0 <= high:
-            return f"a bias that changes its sign over the image: {100 * (self.root_bias or 0):.3g} %"
-        return f"a bias of {100 * (self.bias.value or 0):+.3g} %, 95 % interval {low:+.3g} to {high:+.3g} %"
+        if low <= 0 <= high and self.root_bias is not None:
+            return f"a bias that changes its sign over the image: {100 * self.root_bias:.3g} %"
+        return f"a bias of {(low + high) / 2:+.3g} %, 95 % interval {low:+.3g} to {high:+.3g} %"
 
     def time_to(self, error: float) -> float | None:
         """Return the time until averaged runs have an error [s]; infinite where the bias is larger."""
-        if self.seconds is None or self.variance.value is None:
+        if self.seconds is None or self.variance.value is None or self.correlated:
             return None
         if self.runs == 1:  # nothing to average
             return self.seconds if self.relative_rmse <= error else math.inf
-        bias = (self.root_bias or 0.0) ** 2
+        bias = 0.0 if self.root_bias is None else self.root_bias**2
         return self.variance.value * self.seconds / (error**2 - bias) if error**2 > bias else math.inf
 
     def after(self, runs: float) -> float:
-        """Return the error of so many averaged runs."""
-        return math.sqrt(max((self.squared_bias.value or 0.0) + (self.variance.value or 0.0) / runs, 0.0))
+        """Return the error of so many averaged runs; NaN where they are not independent."""
+        bias, variance = self.squared_bias.value, self.variance.value
+        if bias is None or variance is None or self.correlated:
+            return math.nan
+        return math.sqrt(max(bias + variance / runs, 0.0))
 
 
 def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None = None) -> Noise:
     """Return the noise of renders of a frame; all of the error of a single one is bias.
 
     `reference`: (height, width, channels), finite; `runs`: independent renders of that shape, finite; one of a renderer
-    without random numbers; `seconds`: what one takes. Raises InputError for a dark reference, and runs that are the
-    same.
+    without random numbers; `seconds`: what one takes. Of runs that are the same the first counts. Raises InputError for
+    a dark reference, and where all runs are the same.
     """
+    given, runs = runs, [runs[number] for number in sorted(set(first_equal(runs)))]
+    if len(runs) == 1 < len(given):
+        raise InputError("runs: all are the same, bit by bit; expected renders with different seeds")
     count, mean = len(runs), float(reference.mean())
     if not mean > 0:
         raise InputError("runs: the reference is dark: nothing is relative to it")
@@ -128,18 +159,21 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     bias, square = float(errors.mean()), float(np.mean(errors**2))
     known = Noise(
         runs=count,
-        bias=Estimate(bias, 0.0),
+        bias=fact(bias),
         bias_ci=(bias, bias),
-        squared_bias=Estimate(square, 0.0),
+        squared_bias=fact(square),
         relative_rmse=math.sqrt(square),
         blurred_rmse=tuple(math.sqrt(float(np.mean(values**2))) for values in blurred),
         seconds=seconds,
     )
     known = known if count == 1 else _with_spread(known, errors, blurred)
-    square_of_bias, variance = known.squared_bias, known.variance.value
+    squared_bias, variance = known.squared_bias, known.variance.value
+    root_bias = None
+    if squared_bias.value is not None and squared_bias.exceeds(0.0) is Answer.YES:
+        root_bias = math.sqrt(squared_bias.value)
     known = replace(
         known,
-        root_bias=math.sqrt(square_of_bias.value) if square_of_bias.value and square_of_bias.above(2) else None,
+        root_bias=root_bias,
         efficiency=1 / (variance * seconds) if variance and seconds else None,
     )
     return replace(known, seconds_to={goal: known.time_to(goal) for goal in GOALS}, verdict=known.words())
@@ -148,8 +182,6 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
 def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise:
     """Return the noise with what several runs tell, from their relative errors as they are and blurred."""
     count = len(errors)
-    if (errors[1:] == errors[0]).all():
-        raise InputError("runs: all are the same, bit by bit; expected renders with different seeds")
     flat = errors.reshape(count, -1)
     squared_bias, variance = parts_of_error(flat @ flat.T / flat.shape[1])
     biases = flat.mean(axis=1)
@@ -165,7 +197,7 @@ def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise
         gains.append(math.sqrt(float(np.mean(apart**2)) / square) * 2 * math.sqrt(math.pi) * blur)
     return replace(
         known,
-        bias=Estimate(bias, deviation / math.sqrt(count)),
+        bias=mean_of_runs(biases),
         bias_ci=(bias - half, bias + half),
         detectable_bias=detectable(count) * deviation,
         squared_bias=squared_bias,
@@ -175,7 +207,33 @@ def _with_spread(known: Noise, errors: Array, blurred: Sequence[Array]) -> Noise
         spectrum=spectrum,
         low_fraction=low,
         blur_gain=tuple(gains),
+        correlated=correlated_runs(noise),
     )
+
+
+def correlated_runs(noise: Array) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of runs that are no independent ones, see the module.
+
+    `noise`: deviations from the mean over the runs, (runs, height, width, channels); of two runs, each of which is the
+    other's negative, nothing can be said.
+    """
+    count = len(noise)
+    if count < 3:
+        return ()
+    groups = products(noise)
+    total = groups.sum(axis=0)
+    pairs = np.triu_indices(count, 1)
+
+    def excess(sums: Array) -> Array:
+        """Return by how much correlations of pairs exceed those of independent runs."""
+        deviations = np.sqrt(np.diagonal(sums, axis1=-2, axis2=-1))
+        scale = deviations[..., pairs[0]] * deviations[..., pairs[1]]
+        return np.asarray(sums[..., pairs[0], pairs[1]] / scale + 1 / (count - 1))
+
+    lit = groups[np.trace(groups, axis1=1, axis2=2) > 0]
+    found = estimates(excess(total), excess(total - lit) if len(lit) > 1 else np.empty((0, len(pairs[0]))))
+    shared = [each.exceeds(_SHARED, SURE) is Answer.YES for each in found]
+    return tuple((int(i), int(j)) for i, j, same in zip(*pairs, shared, strict=True) if same)
 
 
 def _blurred(errors: Array, deviation: float) -> Array:
@@ -223,20 +281,23 @@ class NoiseComparison:
     noise: Noise
     nonfinite: int  #: values that are not finite in some run, left out of all
     device: str  #: empty where no file says it
+    notes: tuple[str, ...]
     failures: tuple[str, ...]  #: why the comparison must be called failed
 
     @property
     def lines(self) -> list[str]:
         """Return the numbers as text, a line for each group."""
         noise, width, height = self.noise, *self.size
+        averages = ["unknown: runs are not independent"]
+        if not noise.correlated:
+            averages = [f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)]
         lines = [
             f"scene            {self.scene}, {width} x {height}, {noise.runs} runs; reference: {self.expected}, "
             f"pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
-            f"bias             {told(noise.bias, 100)} %, squared {told(noise.squared_bias)}",
-            f"noise            {100 * math.sqrt(max(noise.variance.value or 0.0, 0.0)):.4g} % of a run, variance "
-            f"{told(noise.variance)}; relative RMSE {100 * noise.relative_rmse:.4g} %",
-            "averaged         "
-            + ", ".join(f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)),
+            f"bias             {noise.bias.percent()}, squared {noise.squared_bias.words()}",
+            f"noise            {noise.deviation.percent()} of a run, variance {noise.variance.words()}; relative RMSE "
+            f"{100 * noise.relative_rmse:.4g} %",
+            f"averaged         {', '.join(averages)}",
             "error spectrum   "
             + " ".join(f"{each:.3g}" for each in noise.spectrum)
             + f"; at low frequencies {noise.low_fraction:.3g}",
@@ -250,6 +311,7 @@ class NoiseComparison:
             times = ", ".join(f"{100 * goal:g} %: {time_words(seconds)}" for goal, seconds in noise.seconds_to.items())
             on = f" on {self.device}" if self.device else ""
             lines.append(f"time             {1000 * noise.seconds:.4g} ms a run{on}; to an error of {times}")
+        lines += [f"note             {note}" for note in self.notes]
         lines += [f"failed           {reason}" for reason in self.failures]
         return [*lines, f"verdict          {noise.verdict}"]
 
@@ -280,7 +342,7 @@ def compare_runs(
             )
     loaded = scene_of_size(scene, first.size, paths[0])
     reference_of = references(loaded, progress)
-    runs = np.array([each.values for each in layers], dtype=np.float64)
+    runs, names, notes, failures = _distinct([each.values.astype(np.float64) for each in layers], paths)
     finite = np.isfinite(runs).all(axis=0)
 
     mean = replace(first, values=np.where(finite, runs, np.nan).mean(axis=0))
@@ -290,8 +352,14 @@ def compare_runs(
     time = image_times(paths[0])
     filled, nonfinite = list(np.where(finite, runs, reference)), int((~finite).sum())
     noise = measure_noise(reference, filled, None if time is None else time[0].median_ms / 1e3)
-    failures = [f"{nonfinite} values are NaN or infinite in some run"] if nonfinite else []
-    if margin is not None and max(map(abs, noise.bias_ci)) > margin:
+    if nonfinite:
+        wrong = ", ".join(name for name, run in zip(names, runs, strict=True) if not np.isfinite(run).all())
+        failures.append(f"{nonfinite} values are NaN or infinite in some run: {wrong}")
+    if noise.correlated:
+        pairs = ", ".join(f"{names[i]} and {names[j]}" for i, j in noise.correlated[:_NAMED])
+        more = "" if len(noise.correlated) <= _NAMED else f" and {len(noise.correlated) - _NAMED} more pairs"
+        notes.append(f"the noise of {pairs}{more} is correlated: they are no independent renders")
+    if margin is not None and (noise.correlated or max(map(abs, noise.bias_ci)) > margin):
         failures.append(f"the relative bias is not shown to be within +-{margin:.3g}")
     return NoiseComparison(
         scene=loaded.name,
@@ -304,8 +372,36 @@ def compare_runs(
         noise=noise,
         nonfinite=nonfinite,
         device="" if time is None else time[1],
+        notes=tuple(notes),
         failures=tuple(failures),
     )
+
+
+def _distinct(runs: list[Array], paths: Sequence[Path]) -> tuple[Array, list[str], list[str], list[str]]:
+    """Return the runs that count, their files, notes on the others, and failures.
+
+    A run without a finite value, and one that is the same as one before it, do not count.
+    """
+    notes, failures = list[str](), list[str]()
+    blank = [path.name for run, path in zip(runs, paths, strict=True) if not np.isfinite(run).any()]
+    if blank:
+        failures.append(f"no value is finite in {', '.join(blank)}: left out")
+    if len(blank) == len(runs):
+        raise InputError(f"{paths[0].parent}: no run has a finite value: all are NaN or infinite")
+    named = [(run, path.name) for run, path in zip(runs, paths, strict=True) if np.isfinite(run).any()]
+    firsts = first_equal([run for run, _ in named])
+    counting = [named[number] for number in sorted(set(firsts))]
+    same = [f"{named[n][1]} is {named[first][1]}" for n, first in enumerate(firsts) if first < n]
+    if same:
+        more = "" if len(same) <= _NAMED else f" and {len(same) - _NAMED} more"
+        notes.append(
+            f"runs are the same, bit by bit, as with one seed used twice: {', '.join(same[:_NAMED])}{more}; each image "
+            f"counts once: {len(counting)} of {len(named)}"
+        )
+    if len(counting) < 2:
+        words = "all are the same, bit by bit" if same else "one of them alone has finite values"
+        raise InputError(f"{paths[0].parent}: {words}; expected two or more renders with different seeds")
+    return np.array([run for run, _ in counting]), [name for _, name in counting], notes, failures
 
 
 def run_paths(pattern: str | os.PathLike[str]) -> list[Path]:

@@ -86,8 +86,8 @@ LEVEL = 0.01
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """One side of a comparison, (height, width) or (height, width, channels)."""
+class NoisyImage:
+    """One side of a comparison: an image with its noise, (height, width) or (height, width, channels)."""
 
     mean: ArrayLike  #: radiance [W/(m^2 sr)]
     standard_error: ArrayLike | None = None  #: of `mean`, of the same shape; None for an image without random error
@@ -110,8 +110,8 @@ class _Side:
 
 
 def compare_statistics(
-    reference: Estimate,
-    test: Estimate,
+    reference: NoisyImage,
+    test: NoisyImage,
     *,
     mask: ArrayLike | None = None,
     margin: float | None = None,
@@ -208,7 +208,7 @@ def block_sums(values: Array, side: int = BLOCK) -> Array:
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
 
 
-def _side(name: str, estimate: Estimate, chosen: Bools, *, scale: float, with_batches: bool) -> _Side:
+def _side(name: str, estimate: NoisyImage, chosen: Bools, *, scale: float, with_batches: bool) -> _Side:
     """Check one estimate and make it regular: float64 of three dimensions, scaled, zero outside the chosen pixels."""
     shape = np.shape(estimate.mean)
     inside = chosen[:, :, None]

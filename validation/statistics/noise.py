@@ -53,6 +53,8 @@ from typing import Any
 
 import numpy as np
 
+from validation.statistics.estimate import Answer, Estimate
+
 ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
 ERROR_TOLERANCE = 0.02  #: relative band of an error
 TIME_TOLERANCE = 0.25  #: relative band of a time
@@ -159,10 +161,12 @@ def _medians(times: Times) -> dict[str, float]:
 def other_power(old: Any, new: Any) -> float:
     """Return by how much a time grows with another power of the work than before, 0 where noise may explain it.
 
-    Both have an `exponent` and its `standard_error`, None where it is not known.
+    Both have an `exponent` and its `standard_error`, None where it is not known: two steps have a power without an
+    error, and of that nothing can be told.
     """
     before, after = old.exponent, new.exponent
-    if before is None or after is None:
+    errors = old.standard_error, new.standard_error
+    if before is None or after is None or None in errors:
         return 0.0
-    scatter = math.hypot(old.standard_error or 0.0, new.standard_error or 0.0)
-    return after - before if abs(after - before) > max(POWER_TOLERANCE, 3 * scatter) else 0.0
+    change = Estimate(after - before, math.hypot(*errors))
+    return after - before if abs(after - before) > POWER_TOLERANCE and change.within(0.0, 3.0) is Answer.NO else 0.0

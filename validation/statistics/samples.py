@@ -5,7 +5,10 @@ A sample of an interval is one independent draw, such as a scene. All numbers th
 or by methods, are one sample.
 """
 
+import math
 from collections.abc import Sequence
+from hashlib import sha256
+from typing import Any
 
 import numpy as np
 import scipy
@@ -13,8 +16,14 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtri, stdtr, stdtrit
 
 from validation.arrays import Array
+from validation.statistics.estimate import INTERVAL, Estimate
 
 LEVEL = 0.95  #: with at least this probability an interval holds what it estimates
+LEAST = 8  #: values of a series of which the mean has an error: of fewer, r says nothing of phi (see `mean_of_series`)
+#: Why a mean has no error, in words.
+UNTOLD_SERIES = f"its error is unknown with fewer than {LEAST} frames, or frames that are all off by the same"
+_SAME = 1e-12  # relative: values that differ by less differ by rounding of float64 alone, of sums of 1e4 of them
+_MOST = 0.95  # persistence that is reckoned with: a history that keeps more is a bias to anyone who sees 128 frames
 
 
 def satterthwaite(variance: ArrayLike, spread: ArrayLike) -> Array:
@@ -50,6 +59,57 @@ def student(values: Array) -> tuple[float, float]:
     """Return the mean of independent values, (n,), and half of its interval of 95 % by Student."""
     error = float(values.std(ddof=1)) / np.sqrt(len(values))
     return float(values.mean()), student_quantile(0.5 + LEVEL / 2, len(values) - 1) * float(error)
+
+
+def widened(error: Any, freedom: float) -> Any:
+    """Return standard errors so widened that twice each is half of Student's interval of 95 %, as `Estimate` has them.
+
+    `error`: a number or an array; `freedom`: their degrees of freedom [1].
+    """
+    return error * (stdtrit(freedom, 0.5 + LEVEL / 2) / INTERVAL)
+
+
+def first_equal(runs: Sequence[Array]) -> list[int]:
+    """Return for each image of several runs the number of the first that is the same, bit by bit."""
+    first: dict[bytes, int] = {}
+    return [first.setdefault(sha256(run.tobytes()).digest(), number) for number, run in enumerate(runs)]
+
+
+def mean_of_runs(values: Sequence[float]) -> Estimate:
+    """Return the mean of independent values, two or more."""
+    middle, half = student(np.asarray(values, dtype=np.float64))
+    return Estimate(middle, half / INTERVAL)
+
+
+def mean_of_series(values: Array) -> Estimate:
+    r"""Return the mean of a stationary series, whose values may depend on those before them; (n,) in order of time.
+
+    If the correlation of two values falls as phi^k with their distance k (an average in time does that), the mean of n
+    of them has the variance of n/f independent ones, and their sample variance is too small:
+
+        f = 1 + 2 sum_k (1 - k/n) phi^k,    E s^2 = sigma^2 (n - f)/(n - 1),    var(mean) = sigma^2 f/n
+
+    phi comes from the first autocorrelation r, whose mean is phi - (1 + 4 phi)/n (Kendall 1954), and one standard error
+    of it, n^(-1/2), is added: too small a phi does harm, too large a phi costs width. It is taken as 0 to `_MOST`. The
+    interval is Student's with n/f - 1 degrees of freedom, at least one.
+
+    Of 6000 series each, n from 8 to 128, the intervals of 95 % hold the true mean in 96 to 98 % for phi = 0, 93 to 98 %
+    for 0.5 and 0.8, 89 to 99 % for 0.95 (tests/validation/statistics/test_intervals.py). Independent values pay with an
+    interval wider by 1.3 at n = 30, by 1.1 at 128. The error is unknown for fewer than `LEAST` values, which do not
+    tell their own dependence, and for a series that never changes: a frozen one looks the same as an exact one.
+    """
+    count, mean = len(values), float(np.mean(values))
+    apart = values - mean
+    square = float(apart @ apart)
+    if count < LEAST or np.abs(apart).max() <= _SAME * abs(mean):
+        return Estimate(mean)
+    correlation = float(apart[1:] @ apart[:-1]) / square
+    persistence = (count * correlation + 1) / (count - 4) + count**-0.5
+    distance = np.arange(1, count)
+    powers = min(max(persistence, 0.0), _MOST) ** distance
+    inflation = 1 + 2 * float((1 - distance / count) @ powers)
+    variance = square / (count - inflation) * inflation / count
+    return Estimate(mean, float(widened(math.sqrt(variance), max(count / inflation - 1, 1.0))))
 
 
 def sidak(level: float, tests: int) -> float:

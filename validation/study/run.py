@@ -33,7 +33,8 @@ from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
 from validation.metrics.other_tools import published_errors
 from validation.motion.blocks import parts_of_error
-from validation.statistics.samples import student
+from validation.statistics.estimate import Answer
+from validation.statistics.samples import first_equal, student
 from validation.study.configuration import Configuration, prepared, rendered_lights
 from validation.study.frame_times import brief_times, camera_rays, shader_times, time_frame
 from validation.study.reference import Reference, load_cell
@@ -199,25 +200,29 @@ def _other_runs(scene: Scene, cell: Cell) -> list[Array]:
 
 
 def _runs_error(reference: Reference, runs: list[Array]) -> RunsError | None:
-    """Return bias and error of runs; None where they are the same, or nothing is relative to the reference."""
+    """Return bias and error of runs; None where they are the same, or nothing is relative to the reference.
+
+    Runs that are the same bit by bit count once.
+    """
+    runs = [runs[number] for number in sorted(set(first_equal(runs)))]
     counts = np.isfinite(runs).all(axis=(0, 3))
     counts &= True if reference.mask is None else reference.mask
     expected = reference.airlight[counts]
     mean = float(expected.mean()) if expected.size else 0.0
     errors = np.array([(run[counts] - expected).ravel() for run in runs])
-    if not mean > 0 or (errors[1:] == errors[0]).all():
+    if not mean > 0 or len(runs) < 2:
         return None
     errors /= mean
     products = errors @ errors.T / errors.shape[1]
     squared, _ = parts_of_error(products)
     bias, rmse = (student(each) for each in (errors.mean(axis=1), np.sqrt(np.diag(products))))
-    root = max(squared.value or 0.0, 0.0)
+    ends = squared.ends()
     return RunsError(
-        len(runs),
+        len(errors),
         *bias,
         *rmse,
-        math.sqrt(root) if squared.above(2) else None,
-        math.sqrt(root + 2 * (squared.error or 0.0)),
+        math.sqrt(squared.value) if squared.value and squared.exceeds(0.0) is Answer.YES else None,
+        None if ends is None else math.sqrt(max(ends[1], 0.0)),
     )
 
 

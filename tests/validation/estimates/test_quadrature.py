@@ -22,7 +22,7 @@ from validation.estimates.images import layered_reference
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer, reference_of_pixels
 from validation.scenes.loading import LoadedScene, load_scene
-from validation.statistics.comparison import Estimate, compare_statistics
+from validation.statistics.comparison import NoisyImage, compare_statistics
 
 
 @pytest.fixture
@@ -170,7 +170,7 @@ def test_errors_of_points_that_all_pixels_share_add_up(common):
         reference = ReferenceImage(
             values[0], 0 * values[0], values[1], none, none, 0, 0.0, **more, replicate_means=means
         )
-        sure = Estimate(np.ones((8, 12, 3)), np.full((8, 12, 3), 1e-9), 64)
+        sure = NoisyImage(np.ones((8, 12, 3)), np.full((8, 12, 3), 1e-9), 64)
         statistics = compare_statistics(reference_estimate(reference, "airlight", sure, mask), sure, mask=mask)
         held += statistics.relative_bias_ci_batches[0] <= 0 <= statistics.relative_bias_ci_batches[1]
         apart += statistics.relative_bias_ci[0] <= 0 <= statistics.relative_bias_ci[1]

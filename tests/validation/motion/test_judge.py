@@ -43,9 +43,30 @@ def test_the_fog_of_the_last_frame_is_late(lights, tmp_path):
     assert found.measures.repeated == (1,)
     numbers = plain(found)["masks"]["all"]
     for name in ["relative_rmse", "flicker", "bias", "ghost"]:
-        assert numbers[name].keys() == {"value", "error"}
-    for name in ["gain", "persistence", "delay", "lag", "time_constant"]:
-        assert numbers["lag"][name].keys() == {"value", "error"}
+        assert numbers[name].keys() == {"value", "error", "kind"}
+    for name in ["gain", "persistence", "delay_margin", "lag", "time_constant"]:
+        assert numbers["lag"][name].keys() == {"value", "error", "kind"}
+    assert numbers["lag"]["delay"] == 1
+
+
+def test_a_frame_without_a_finite_value_is_named(lights, tmp_path):
+    changes, references = lights
+    frames = [*references[:3], np.nan * references[3], *references[4:]]
+    found = compare_frames("open-fog", *written(tmp_path, frames, changes=changes, pixel="centre"))
+    assert found.failures == (f"{references[3].size} values are NaN or infinite, in frames 3 (0004.exr)",)
+    files = written(tmp_path, [np.nan * each for each in references], changes=changes, pixel="centre")
+    with pytest.raises(InputError, match="no frame has a finite value"):
+        compare_frames("open-fog", *files)
+
+
+def test_a_margin_that_too_few_frames_tell_is_not_kept(lights, tmp_path):
+    """The error of a bias of seven frames is not known: it counted as 0, and the bias of 0.4 % as within 0.5 %."""
+    changes, references = {"light.position": lights[0]["light.position"][:7]}, lights[1][:7]
+    frames = [1.004 * each for each in references]
+    found = compare_frames("open-fog", *written(tmp_path, frames, changes=changes, pixel="centre"), margin=0.005)
+    assert "not shown to be within +-0.005: its error is unknown" in found.failures[0]
+    exact = compare_frames("open-fog", *written(tmp_path, references, changes=changes, pixel="centre"), margin=0.005)
+    assert not exact.failures
 
 
 def test_exposure_is_taken_away(lights, tmp_path):

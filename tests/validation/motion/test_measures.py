@@ -8,7 +8,8 @@ import pytest
 
 from validation.columns import plain
 from validation.motion.judge import motion_verdict
-from validation.motion.measures import Measures, Sequence, measure
+from validation.motion.measures import Measures, Sequence, mean_measures, measure
+from validation.statistics.estimate import Answer
 
 FRAMES, HEIGHT, WIDTH = 40, 24, 32
 WEIGHT = 0.1  # of the new frame in an exponential average
@@ -91,14 +92,14 @@ def test_an_average_lags():
     """Weight a of a new frame: persistence 1 - a, lag (1 - a)/a, missing share exp(-n/tau)."""
     found = measured(averaged(LIGHT))
     assert found.lag.persistence.value == pytest.approx(0.9, abs=1e-6)
-    assert found.lag.delay.value == 0
+    assert found.lag.delay == 0
     assert found.lag.lag.value == pytest.approx(9, abs=1e-2)
     assert found.lag.time_constant.value == pytest.approx(-1 / math.log(0.9), abs=1e-2)
     assert found.flicker_beside_lag.value < 1e-6
     assert found.flicker.value == pytest.approx(
         math.sqrt(np.mean(np.diff(averaged(LIGHT) - LIGHT, axis=0) ** 2)) / MEAN
     )
-    assert found.ghost.above(4)
+    assert found.ghost.exceeds(0.0, 4.0) is Answer.YES
     assert motion_verdict(found).kind == "lag"
 
 
@@ -107,7 +108,8 @@ def test_an_average_lags():
 def test_frames_of_another_number_are_late(delay, sigma):
     places = np.clip(np.arange(FRAMES) - delay, 0, FRAMES - 1)
     found = measured(LIGHT[places] + noise(3, sigma))
-    assert (found.lag.delay.value, found.lag.delay.error) == (delay, 0)
+    assert found.lag.delay == delay
+    assert found.lag.delay_margin.exceeds(0.0, 4.0) is Answer.YES
     verdict = motion_verdict(found)
     assert verdict.kind == "late"
     assert f"{'late' if delay > 0 else 'early'} by {abs(delay)} frame" in verdict.words
@@ -129,7 +131,7 @@ def test_a_factor_and_a_constant_are_no_lag():
 
 def test_light_of_one_age_is_a_ghost():
     found = measured(ghosted(0.3, 6))
-    assert found.ghost.above(4)
+    assert found.ghost.exceeds(0.0, 4.0) is Answer.YES
     assert found.lag.described < 0.9
     response = [each.value for each in found.lag.response]
     assert 1 + int(np.argmax(response[1:])) in (6, 7)
@@ -162,7 +164,6 @@ def test_without_a_change_of_the_reference_no_lag_is_told():
     assert found.relative_rmse.value == pytest.approx(
         expected, rel=0.02
     )  # 92 000 values, of which 4800 are independent
-    assert 15 <= found.convergence <= 30  # 0.81^n (1/0.0526 - 1) is 0.1 at n = 25, with noise of 1 % a frame
 
 
 def test_histories_begin_at_resets():
@@ -198,10 +199,44 @@ def test_values_that_are_not_finite_are_counted_and_left_out():
     assert found.relative_rmse.value == 0
 
 
+@pytest.mark.parametrize(("factor", "kind"), [(1.0, "exact"), (2.0, "cannot be told")])
+def test_light_in_one_block_has_no_errors_and_decides_nothing(factor, kind):
+    """Without its block nothing is left: no number has an error, and frames twice too bright are not exact."""
+    light = np.zeros_like(LIGHT)
+    light[:, 8:16, 8:16] = LIGHT[:, 8:16, 8:16]
+    found = measured(factor * light, light)
+    for estimate in (found.relative_rmse, found.flicker, found.lag.gain, found.lag.persistence, found.ghost):
+        assert estimate.error is None
+    assert found.bias.value == pytest.approx(factor - 1)
+    assert motion_verdict(found).kind == kind
+
+
+def test_rounding_is_no_noise():
+    """Frames twice too bright, with light in 9 x 9 pixels."""
+    light = np.zeros_like(LIGHT)
+    light[:, 8:17, 8:17] = LIGHT[:, 8:17, 8:17]
+    assert motion_verdict(measured(2 * light, light)).words == "no lag: no noise beyond rounding, and a factor of 2"
+
+
+def test_the_mean_of_runs_is_unknown_where_one_of_them_is():
+    """The first run stood for all where another told nothing, and its values that are not finite for those of all."""
+    still = np.broadcast_to(LIGHT[:1], LIGHT.shape).copy()
+    broken = still.copy()
+    broken[3, 2, 1] = np.nan
+    runs = [measured(LIGHT + noise(1, 0.1)), measured(broken + noise(2, 0.1), still)]
+    found = mean_measures(runs)
+    assert (found.lag.lag.value, found.lag.delay, found.nonfinite) == (None, None, 3)
+    assert motion_verdict(found).kind == "cannot be told"
+    assert found.relative_rmse.value == pytest.approx(0.1, rel=0.01)
+
+
 @pytest.mark.slow
 @pytest.mark.claim("sequence-intervals")
 def test_intervals_hold_the_reference():
-    """Of 100 repeats 95 % intervals hold it in 90 to 99, and numbers scatter as their errors say."""
+    """Of 100 repeats 95 % intervals hold it in 90 to 99, and numbers scatter as their errors say.
+
+    The interval of the bias is wider, as its frames need not be independent (`mean_of_series`): 1.3 times at 40 frames.
+    """
     frames, held = ghosted(0.0, 6), np.zeros(4)
     scores = []
     for seed in range(100):
@@ -210,9 +245,9 @@ def test_intervals_hold_the_reference():
         errors = [found.lag.gain.error, found.lag.persistence.error]
         still = measured(LIGHT + noise(100 + seed, 0.2))
         apart += [still.ghost.value, still.bias.value]
-        errors += [still.ghost.error, still.bias.error or np.inf]
+        errors += [still.ghost.error, still.bias.error]
         scores.append(np.array(apart) / errors)
         held += np.abs(scores[-1]) < 1.98
-    assert ((held >= 90) & (held <= 99)).all(), held
-    spread = np.std(scores, axis=0)
+    assert ((held >= 90) & (held <= (99, 99, 99, 100))).all(), held
+    spread = np.std(scores, axis=0) * (1, 1, 1, 1.3)
     assert ((spread > 0.8) & (spread < 1.25)).all(), spread

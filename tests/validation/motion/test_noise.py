@@ -14,6 +14,7 @@ from validation.estimates.quadrature import reference_image
 from validation.motion.blocks import parts_of_error
 from validation.motion.noise import Noise, compare_runs, detectable, measure_noise
 from validation.scenes.loading import load_scene
+from validation.statistics.estimate import Answer
 from validation.statistics.samples import student
 
 REFERENCE = np.linspace(0.5, 1.5, 24 * 32 * 3).reshape(24, 32, 3)
@@ -121,6 +122,55 @@ def test_a_bias_of_changing_sign_shows_in_its_square():
     assert found.bias_ci[0] < 0 < found.bias_ci[1]
     assert found.root_bias == pytest.approx(0.1, rel=0.05)
     assert math.isinf(found.seconds_to[0.05] or math.inf)
+
+
+def test_a_seed_used_twice_is_noticed(variant, tmp_path):
+    """Eight files of four images are four runs: their squared bias, which is 0, would be far from it by its error."""
+    exact = reference_image(load_scene("open-fog", (16, 12)).scene).airlight
+    random = np.random.default_rng(116)
+    images = [exact + 0.3 * exact.mean() * random.normal(size=exact.shape) for _ in range(4)]
+    for run in range(8):
+        write_exr(tmp_path / f"{run:04d}.exr", Image({"airlight": images[run // 2]}), finite=False)
+    found = compare_runs("open-fog", tmp_path / "####.exr", pixel="centre")
+    assert found.noise.runs == 4
+    assert found.noise.squared_bias.exceeds(0.0) is not Answer.YES
+    assert "0001.exr is 0000.exr" in found.notes[0]
+    assert "4 of 8" in found.notes[0]
+
+
+def test_a_run_without_a_finite_value_is_named(variant, tmp_path):
+    exact = reference_image(load_scene("open-fog", (16, 12)).scene).airlight
+    random = np.random.default_rng(5)
+    for run in range(4):
+        image = np.nan * exact if run == 2 else exact + 0.1 * exact.mean() * random.normal(size=exact.shape)
+        write_exr(tmp_path / f"{run}.exr", Image({"airlight": image}), finite=False)
+    found = compare_runs("open-fog", tmp_path / "#.exr", pixel="centre")
+    assert found.noise.runs == 3
+    assert found.failures == ("no value is finite in 2.exr: left out",)
+    for run in range(4):
+        write_exr(tmp_path / f"{run}.exr", Image({"airlight": np.nan * exact}), finite=False)
+    with pytest.raises(InputError, match="no run has a finite value"):
+        compare_runs("open-fog", tmp_path / "#.exr", pixel="centre")
+
+
+@pytest.mark.parametrize("made", ["independent", "history", "accumulated", "skewed"])
+def test_runs_that_depend_on_one_another_have_no_average(made):
+    """A history between runs, and averages that go on, correlate the noise of neighbours; skewed noise does not."""
+    runs = renders(6, 8)
+    if made == "history":
+        for number in range(1, 8):
+            runs[number] = 0.5 * (runs[number] + runs[number - 1])
+    elif made == "accumulated":
+        runs = [np.mean(runs[: number + 1], axis=0) for number in range(8)]
+    elif made == "skewed":
+        random = np.random.default_rng(8)
+        runs = [REFERENCE * random.exponential(size=(24, 32, 1)) for _ in range(8)]
+    found = measure_noise(REFERENCE, runs)
+    dependent = made in ("history", "accumulated")
+    assert bool(found.correlated) == dependent == math.isnan(found.after(64))
+    assert ("runs are not independent" in found.verdict) == dependent
+    if dependent:
+        assert (0, 1) in found.correlated
 
 
 def test_renders_of_a_scene_from_files(variant, tmp_path):

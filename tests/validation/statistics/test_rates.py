@@ -23,7 +23,7 @@ from tests.helpers.calibration import (
     problems,
     spread_to_detect,
 )
-from validation.statistics.comparison import Estimate, compare_statistics
+from validation.statistics.comparison import NoisyImage, compare_statistics
 
 pytestmark = pytest.mark.statistical
 
@@ -33,7 +33,7 @@ OUTSIDE = 1e-4  # probability that a rate leaves its interval
 def repeated(draw, *, runs, batches=BATCHES, shape=SIZE, by_batch=True, margin=None, seed=1):
     """Compare many images, drawn with the mean 1 unless they are to be found wrong, with a noiseless reference."""
     rng = np.random.default_rng(seed)
-    reference = Estimate(np.ones(shape))
+    reference = NoisyImage(np.ones(shape))
     comparisons = []
     for _ in range(runs):
         estimate = monte_carlo(draw(rng, (batches, *shape)))
@@ -78,8 +78,8 @@ def test_wrong_standard_errors_are_found_in_both_directions(factor):
     rng = np.random.default_rng(13)
     estimate = monte_carlo(around_one(rng, (BATCHES, 64, 64)))
     wrong = dataclasses.replace(estimate, standard_error=factor * np.asarray(estimate.standard_error))
-    right = compare_statistics(Estimate(np.ones((64, 64))), estimate)
-    s = compare_statistics(Estimate(np.ones((64, 64))), wrong)
+    right = compare_statistics(NoisyImage(np.ones((64, 64))), estimate)
+    s = compare_statistics(NoisyImage(np.ones((64, 64))), wrong)
     assert min(right.exceeding_p, right.uniformity_p) > 1e-3
     assert max(s.exceeding_p, s.uniformity_p) < 1e-3
     assert (s.exceeding < s.expected_exceeding) == (factor > 1)
