@@ -3,11 +3,11 @@
 
 The folder is that of `reference/storage/cache.py`, which this side does not import: AIRLIGHT_CACHE_DIR, or `airlight`
 in the user's cache folder. A file that is damaged, which the checksums of its archive tell, or from elsewhere counts as
-none. With AIRLIGHT_CACHE_SIZE=0 nothing is kept.
+none. With AIRLIGHT_CACHE_SIZE=0 nothing is kept, and nothing read.
 
-The name of a file tells how numbers were made; which medium they are of, the moments of its phase function and its
-albedo, stands in it. A phase function that a scene holds as a table in single precision has its moments to 1e-5, and
-finds the numbers of the function that the table was made of.
+The name of a file tells how numbers were made, and of which medium: by the moments of its phase function and its albedo,
+to the last bit. Numbers of a medium that is nearly the same would be other ones: an image would depend on what was
+rendered before.
 """
 
 import os
@@ -28,10 +28,7 @@ from realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[Any]
 
-_MEDIUM = "medium"
-_TOLD_APART = 300  #: moments by which phase functions are told apart
-#: By which media may differ that share numbers. In thick slabs light is scattered thousands of times.
-_SAME_MOMENT, _SAME_ALBEDO = 2e-5, 1e-6
+_MOMENTS = 300  #: those that tell phase functions apart: as many as the quadrature of `AnglePhase` resolves
 
 
 def _folder() -> Path:
@@ -42,7 +39,7 @@ def _folder() -> Path:
 
 def medium_numbers(phase: SlabPhase, albedo: float) -> Array:
     """Return the key of a medium: moments of its phase function, and its albedo."""
-    return np.append(phase.moments(_TOLD_APART), albedo)
+    return np.append(phase.moments(_MOMENTS), albedo)
 
 
 def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
@@ -50,35 +47,34 @@ def load_kept(digest: str, medium: Array) -> dict[str, Any] | None:
 
     `digest`: of how numbers were made; `medium`: from `medium_numbers`.
     """
-    for path in sorted(_folder().glob(f"canonical-{digest}-*.npz")):
-        arrays = _read(path, medium)
-        if arrays is not None:
-            with suppress(OSError):
-                os.utime(path)  # what was used longest ago is dropped first
-            return arrays
-    return None
-
-
-def _read(path: Path, medium: Array) -> dict[str, Any] | None:
-    """Return the arrays of a file, None where it is of another medium or damaged."""
+    if not _keeps():
+        return None
+    path = _path(digest, medium)
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            apart = np.abs(stored[_MEDIUM] - medium)
-            if np.any(apart[:-1] > _SAME_MOMENT) or apart[-1] > _SAME_ALBEDO:
-                return None
             arrays = {name: stored[name] for name in stored.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
+    with suppress(OSError):
+        os.utime(path)  # what was used longest ago is dropped first
     return arrays
+
+
+def _keeps() -> bool:
+    return os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip() != "0"
+
+
+def _path(digest: str, medium: Array) -> Path:
+    return _folder() / f"canonical-{digest}-{blake2b(medium.tobytes(), digest_size=8).hexdigest()}.npz"
 
 
 def keep(digest: str, medium: Array, arrays: Mapping[str, Any]) -> None:
     """Write arrays under a digest of a medium; where the folder cannot be written, nothing is kept."""
-    if os.environ.get("AIRLIGHT_CACHE_SIZE", "").strip() == "0":
+    if not _keeps():
         return
     buffer = BytesIO()
-    np.savez(buffer, **{**arrays, _MEDIUM: medium})
-    path = _folder() / f"canonical-{digest}-{blake2b(medium.tobytes(), digest_size=8).hexdigest()}.npz"
+    np.savez(buffer, **arrays)
+    path = _path(digest, medium)
     temporary = path.with_name(f".{path.stem}-{uuid.uuid4().hex}.npz")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
