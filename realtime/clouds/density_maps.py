@@ -82,13 +82,14 @@ def light_depths(
     clouds: Clouds,
     light: Light,
     *,
-    cloud: int,
+    cloud: Any,
     stride: Any,
 ) -> LightDepths:
     """Return the depths between a sun and all points of a cloud.
 
     `surfaces`, `clouds`: the boundaries, and what fills them, with a density; `light`: a directional light, with an
-    extent that holds the clouds; `cloud`: the number of the cloud; `stride`: how long the steps are at most [voxels].
+    extent that holds the clouds; `cloud`: the number of the cloud, opaque: all clouds share kernels; `stride`: how long
+    the steps are at most [voxels].
     """
     Float = type(light.position.x)
     start, axis, texel = texel_rays(light, SIZE)
@@ -150,7 +151,10 @@ def sun_depths(
     """Return the maps of all suns, by light and cloud; arguments as of `light_depths`."""
     count = dr.width(clouds.phase)
     return tuple(
-        tuple(light_depths(surfaces, clouds, light, cloud=cloud, stride=stride) for cloud in range(count))
+        tuple(
+            light_depths(surfaces, clouds, light, cloud=dr.opaque(mi.UInt32, cloud), stride=stride)
+            for cloud in range(count)
+        )
         for light in lights
     )
 
@@ -178,7 +182,7 @@ def dense_surface(
     *,
     threshold: Any,
     stride: Any,
-    only: int | None = None,
+    only: Any = None,
 ) -> DenseSurface:
     """Return where rays first meet more than a density.
 
@@ -227,7 +231,7 @@ def lit_dense_surface(
     light: Light,
     size: int,
     *,
-    cloud: int,
+    cloud: Any,
     body: Any,
     threshold: float,
     stride: Any,
@@ -235,7 +239,7 @@ def lit_dense_surface(
     """Return the lit surfaces of one cloud along a light, as `realtime.clouds.light_maps.cast_surfaces` does.
 
     `surfaces`, `clouds`, `threshold`, `stride`: as for `dense_surface`; `light`, `size`: as for `cast_surfaces`;
-    `cloud`: its number; `body`: by cloud, mean(rho where rho > rho_0) [1].
+    `cloud`: its number, opaque; `body`: by cloud, mean(rho where rho > rho_0) [1].
     """
     check_size(size)
     Float, Vector = type(light.position.x), type(light.position)
@@ -247,7 +251,7 @@ def lit_dense_surface(
     there = dr.isfinite(met.distance)
     distance = dr.select(there, met.distance, 0)
     front = dr.select(there, Float(light.extent.depth) - distance, 0)
-    back = dr.select(there, front - met.behind / dr.gather(Float, body, mi.UInt32(cloud)), 0)
+    back = dr.select(there, front - met.behind / dr.gather(Float, body, cloud), 0)
     lit = LitSurfaces(size, texel, there, front, back)
     dr.eval(lit)
     return lit

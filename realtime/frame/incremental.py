@@ -91,6 +91,8 @@ def _next_of(
     light_moved: bool,
 ) -> tuple[tuple[Any, Any, Any], FrameCache]:
     """Do what `next_frame` does for the scene of a renderer; a `state` was made for it before, where it is not None."""
+    frames = cache.frames if cache else 0
+    renderer = replace(renderer, frame=renderer.frame + frames)
     geometry_moved |= light_moved and any(light.opaque for light in renderer.scene.area_lights)
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
     finish: Callable[[], Any] | None = None
@@ -107,8 +109,6 @@ def _next_of(
         by_light = run_shade(renderer, cast)
     if finish is not None:
         state = finish()
-    frames = cache.frames if cache else 0
-    renderer = replace(renderer, frame=renderer.frame + frames)
     rendered = run_method(renderer, state, cast, by_light, cache.carried if cache else None)
     return evaluated(cast, rendered), FrameCache(cast, state, rendered.carried, rendered.extra, frames + 1)
 

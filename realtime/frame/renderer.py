@@ -21,7 +21,7 @@ intermediate images.
 import gc
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
-from functools import reduce
+from functools import cached_property, reduce
 from operator import add
 from typing import Any
 
@@ -43,15 +43,14 @@ from realtime.numerics.noise import Noise, blue_mask
 from realtime.numerics.recorded import Frozen, refusals
 from realtime.parameters import values
 from realtime.scene.camera import TILE, tiled_pixels
-from realtime.scene.light_samples import with_light_samples
+from realtime.scene.light_samples import light_samples
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene
 
-_ROOM = 2**30  # of states of groups of lights, such as shadow maps [bytes]
+_ROOM = 2**30  # of states of groups of lights, such as shadow maps, and as much of surfaces by group [bytes]
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
 _PART = 2**20  # pixels of a part at most
 _FEW = 4  # lights without extent whose code one kernel may hold; in bounded media it is long, and only one may
-_MOST_KEPT = 32  # groups of lights of which states and surfaces are kept; those of others are made when needed
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Stages:
     prepare: Preparation  #: scene -> the state of the method: shadow maps, shadow planes
     surface: Callable[..., Any]  #: -> what camera rays meet, and what `shade` returns for it
     shade: Callable[..., Any]  #: -> surface radiance: by light where the method knows their visibility, or a sum
-    render: Callable[..., Any]  #: -> what `_rendered` returns
+    render: Callable[..., Any]  #: -> what `_composed` returns
     shade_casts_rays: bool  #: whether shading asks Mitsuba for shapes or shadows
 
 
@@ -107,6 +106,11 @@ class FrameRenderer:
         method = self.method
         return method.at_once and not method.provides_visibility and len(self.scene.lights) > _FEW
 
+    @cached_property
+    def samples(self) -> tuple[Light, ...]:
+        """The light samples of the area lights of the scene as it is now, made once for all stages of a frame."""
+        return light_samples(self.scene, self.light_samples.points, self.light_samples.pattern)
+
     @property
     def stages(self) -> Stages:
         """The functions of the first group of lights."""
@@ -114,8 +118,9 @@ class FrameRenderer:
 
     def prepare(self, scene: Scene) -> tuple[Any, ...]:
         """Return the state of the method by groups of lights, None for those that are not kept."""
+        renderer = self if scene is self.scene else replace(self, scene=scene)
         states: list[Any] = []
-        for group in light_groups(replace(self, scene=scene)):
+        for group in light_groups(renderer):
             kept = not states or len(states) < kept_groups(states[0])
             states.append(group.stages.prepare(group.scene) if kept else None)
         return tuple(states)
@@ -236,14 +241,19 @@ def _structure(lights: tuple[Light, ...]) -> tuple[tuple[bool, ...], ...]:
 
 def _lights_by_group(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
     """Return the lights of a scene by groups."""
-    scene, points = renderer.scene, renderer.light_samples
-    lit = with_light_samples(scene, points.points, points.pattern) if scene.area_lights else scene
+    scene = renderer.scene
     if renderer.method.at_once or renderer.extra_layers:
-        return [lit.lights]
+        return [scene.lights + renderer.samples]
+    return _few_together(renderer)
+
+
+def _few_together(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
+    """Return a few lights without extent together, more of them and light samples one by one."""
+    scene = renderer.scene
     groups = [scene.lights] if scene.lights else []
     if len(scene.lights) > (1 if scene.features.bounded else _FEW):
         groups = [(light,) for light in scene.lights]
-    return groups + [(sample,) for sample in lit.lights[len(scene.lights) :]]
+    return groups + [(sample,) for sample in renderer.samples]
 
 
 def surface_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
@@ -260,7 +270,7 @@ def _few_lights(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
     """Return the lights of a scene, few of one structure together: a call goes through the whole Mitsuba scene."""
     most = 1 if renderer.scene.features.bounded else _FEW
     alike: dict[Any, list[Light]] = {}
-    for light in (light for lights in _lights_by_group(replace(renderer, method=Method())) for light in lights):
+    for light in (light for lights in _few_together(renderer) for light in lights):
         alike.setdefault(_structure((light,)), []).append(light)
     return [tuple(own[first : first + most]) for own in alike.values() for first in range(0, len(own), most)]
 
@@ -310,7 +320,8 @@ def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, alone: bool):
     """
     surface, beyond = None, layers.background
     if layers.visibility is not None:
-        surface = _sum(tuple(_lit(fraction, color) for fraction, color in zip(layers.visibility, by_light)))
+        lit = zip(layers.visibility, by_light, strict=True)
+        surface = _sum(tuple(_lit(fraction, color) for fraction, color in lit))
     if layers.transmittance is not None:
         surface = layers.transmittance * (_sum(by_light) if surface is None else surface)
         beyond = None if beyond is None else layers.transmittance * beyond
@@ -390,7 +401,7 @@ def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, tuple[Any, ...]]:
     cast, by_light = first.stages.surface(*shown)
     if renderer.shades_apart:
         return cast, (_added(renderer, others, cast, by_light),)
-    kept = others[: _MOST_KEPT - 1]
+    kept = others[: kept_groups(by_light) - 1]
     shaded = [_shaded(renderer, group, cast) for group in kept] + [None] * (len(others) - len(kept))
     return cast, (by_light, *shaded)
 
@@ -403,7 +414,10 @@ def run_shade(renderer: FrameRenderer, cast: Cast) -> tuple[Any, ...]:
     groups = surface_groups(renderer)
     if renderer.shades_apart:
         return (_added(renderer, groups[1:], cast, _shaded(renderer, groups[0], cast)),)
-    return tuple(_shaded(renderer, group, cast) if k < _MOST_KEPT else None for k, group in enumerate(groups))
+    by_light = _shaded(renderer, groups[0], cast)
+    kept = kept_groups(by_light)
+    others = (_shaded(renderer, group, cast) if k < kept else None for k, group in enumerate(groups[1:], 1))
+    return (by_light, *others)
 
 
 def _added(renderer: FrameRenderer, groups: Sequence[LightGroup], cast: Cast, by_light: tuple[PerRay, ...]):
@@ -485,8 +499,8 @@ def _run_group(
 
 
 def kept_groups(state: Any) -> int:
-    """Return of how many groups of lights states like this are kept: not more than fill the room for them."""
-    return min(_MOST_KEPT, max(1, _ROOM // max(_bytes_in(state), 1)))
+    """Return of how many groups of lights states, or surfaces, like this are kept: not more than fill the room."""
+    return max(1, _ROOM // max(_bytes_in(state), 1))
 
 
 def _bytes_in(value: Any) -> int:

@@ -140,9 +140,9 @@ def surface_stages(
     facets, pixel, camera, medium, lights, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:
     whether `shade` needs the geometry.
     """
-    if not scene.features.surfaces:
-        return _nothing_met, no_surface, False
     sources = sources_of(scene.lights)
+    if not scene.features.surfaces:
+        return *_no_surfaces(len(sources) if by_source else len(scene.lights) if provides_visibility else 1), False
     # The map of a light at infinity covers the media alone; surfaces beside them are lit too.
     asked = [not (light.w and provides_visibility) for light in scene.lights]
 
@@ -175,14 +175,14 @@ def surface_stages(
     return surface, Frozen(shade_all), scene.facets is None or any(asked)
 
 
-def _nothing_met(geometry, facets, pixel, camera, medium, lights):
-    cast = Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel)))
-    return cast, no_surface(geometry, facets, pixel, camera, medium, lights, cast)
+def _no_surfaces(colors: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return the stages of a scene without surfaces, whose `shade` returns that many black colours."""
 
+    def shade(geometry, facets, pixel, camera, medium, lights, cast):
+        return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in range(colors))
 
-def no_surface(geometry, facets, pixel, camera, medium, lights, cast):
-    """Return the result of `shade` without surfaces: black, RGB [W/(m^2 sr)], for each light.
+    def surface(geometry, facets, pixel, camera, medium, lights):
+        cast = Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel)))
+        return cast, shade(geometry, facets, pixel, camera, medium, lights, cast)
 
-    The parameters are those of `shade`: `geometry`, `facets`, `pixel`, `camera`, `medium`, `lights`, `cast`.
-    """
-    return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in lights)
+    return surface, shade

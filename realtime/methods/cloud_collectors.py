@@ -220,7 +220,9 @@ def _preparation(scene: Scene, parameters: CloudCollectors) -> Callable[[Scene],
         maps = tuple(
             filtered_map(
                 [
-                    lit_dense_surface(surfaces, filled, light, parameters.map, cloud=cloud, **settings)
+                    lit_dense_surface(
+                        surfaces, filled, light, parameters.map, cloud=dr.opaque(mi.UInt32, cloud), **settings
+                    )
                     for cloud in range(clouds)
                 ],
                 light,

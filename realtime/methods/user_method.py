@@ -31,6 +31,7 @@ import numpy as np
 from realtime.errors import InputError, root_of
 from realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
 from realtime.parameters import values
+from realtime.scene.lights import sources_of
 
 _WANTED = "expected 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
@@ -147,7 +148,7 @@ def _guarded(method: type[Method], name: str) -> type[Method]:
     def render(self, view, state, kernel):
         with user_errors(f"method {name}", file):
             returned = method.render(self, view, state, kernel)
-        return checked_layers(returned, view, name, visibility=self.provides_visibility)
+        return checked_layers(returned, view, name, visibility=self.provides_visibility, by_source=self.by_source)
 
     return dataclass(frozen=True)(type(method.__name__, (method,), {"name": name, "render": render}))
 
@@ -367,7 +368,7 @@ def checked_radiance(returned: Any, view: View, name: str):
     return Color(*(Float(channel) + dr.zeros(Float, width) for channel in channels))
 
 
-def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) -> Layers:
+def checked_layers(returned: Any, view: View, name: str, *, visibility: bool, by_source: bool) -> Layers:
     """Return the layers of a method, their in-scattered radiance as `checked_radiance` does.
 
     Parameters
@@ -380,6 +381,8 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
         Its name, for messages.
     visibility
         Whether it says that it provides the visibility of its lights.
+    by_source
+        Whether it has one entry for all samples of an area light.
 
     Raises
     ------
@@ -391,7 +394,7 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool) ->
             f"method {name}: returned a {type(returned).__name__}; expected realtime.methods.interface.method.Layers"
         )
     fractions = 0 if returned.visibility is None else len(returned.visibility)
-    wanted = len(view.lights) if visibility else 0
+    wanted = len(sources_of(view.lights) if by_source else view.lights) if visibility else 0
     if fractions != wanted or (returned.visibility is None) == visibility:
         raise InputError(
             f"method {name}: returned the visibility of {fractions} lights, expected that of {wanted}: one for each "

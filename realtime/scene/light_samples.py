@@ -25,16 +25,6 @@ from realtime.scene.read_scene import Scene
 Array = NDArray[np.float64]
 
 
-def with_light_samples(scene: Scene, points: int, pattern: str) -> Scene:
-    """Return a scene whose lights are the ordinary ones, followed by the points of each area light in turn.
-
-    `scene`: from `realtime.scene.read_scene.read_scene`; `points`, `pattern`: see
-    `realtime.area_lights.points.LightSamples`. Raises InputError for a number or a pattern that there is not.
-    """
-    ordinary = tuple(light for light in scene.lights if light.source is None)
-    return replace(scene, lights=ordinary + light_samples(scene, points, pattern))
-
-
 def light_samples(scene: Scene, points: int, pattern: str) -> tuple[Light, ...]:
     """Return the points of the area lights of a scene, light after light.
 
@@ -105,10 +95,9 @@ def _table(numbers: list[int], lights: list[Light]) -> LightTable:
         scalar = type(array.x) if dr.depth_v(array) > 1 else type(array)
         columns += [aligned_array(scalar, column) for column in values.T]
     Float = type(lights[0].position.x)
-    # A light begins with its position and intensity, a spot goes on with axis and cut-off.
-    power = np.stack(read[1::every]).mean(axis=1)
+    power = np.stack(host_numbers(*(light.intensity for light in lights))).mean(axis=1)
     if lights[0].cone is not None:
-        power = power * (1 - np.cos(np.concatenate(read[3::every])))
+        power = power * (1 - np.concatenate(host_numbers(*(light.cone.cos for light in lights))))
     power = power if power.sum() > 0 else np.ones(len(lights))
     sums = np.cumsum(power) / power.sum()
     return LightTable(

@@ -5,9 +5,9 @@ The folder is that of `reference/storage/cache.py`, which this side does not imp
 in the user's cache folder. A file that is damaged, which the checksums of its archive tell, or from elsewhere counts as
 none. With AIRLIGHT_CACHE_SIZE=0 nothing is kept, and nothing read.
 
-The name of a file tells how numbers were made, and of which medium: by the moments of its phase function and its albedo,
-to the last bit. Numbers of a medium that is nearly the same would be other ones: an image would depend on what was
-rendered before.
+The name of a file tells how numbers were made, and of which medium: by the moments of its phase
+function and its albedo, to the last bit. With the numbers of a medium that is nearly the same an
+image would depend on what was rendered before.
 """
 
 import os

@@ -14,7 +14,7 @@ A frame shows
 in which `surface` is the light of a lamp that the visible surface reflects to the camera, through the medium of the
 scene and without shadows, summed over the lamps.
 
-It is given a view: the camera rays of a frame, the lights and the media.
+A method is given a view: the camera rays of a frame, the lights and the media.
 """
 
 from collections.abc import Callable, Mapping

@@ -63,6 +63,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from realtime.errors import InputError
 from realtime.methods.shadow_planes.silhouettes import NEARNESS, Silhouette, is_outside, ring_edges, silhouette
 from realtime.numerics.array_types import four_numbers, is_single
 from realtime.numerics.functions import TURN, host_diamond_angle, host_direction
@@ -73,7 +74,7 @@ Array = NDArray[np.float64]
 
 # An entry of a list: the number of a plane, the layers gained beyond it, and a mark.
 NUMBER = (1 << 24) - 1
-GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -32 to 31; a plane that gains more is there more than once
+GAIN_SHIFT, GAIN_ZERO = 24, 32  #: gains from -31 to 31
 FULL = 1 << 30  #: the plane is at all azimuths of the wedge
 
 _FINE = 4  # wedges that a plane spans on average: lists are a quarter longer than what is at an azimuth
@@ -181,7 +182,18 @@ def wedge_lists(planes: Planes, *, order: str) -> tuple[NDArray[np.uint32], NDAr
 
     `planes`: none across azimuth 0; `order`: 'paper': towards the camera by the cosine of the middle of the edge;
     'exact' and 'none': as rays cross them.
+
+    Raises
+    ------
+    InputError
+        For more planes, or larger gains, than an entry has room for.
     """
+    gain = np.abs(planes.gain.astype(np.int64)).max(initial=0)
+    if len(planes.gain) > NUMBER + 1 or gain >= GAIN_ZERO:
+        raise InputError(
+            f"a light has {len(planes.gain)} shadow planes of up to {gain} layers; expected up to "
+            f"{NUMBER + 1} of {GAIN_ZERO - 1}: use simpler occluders, or light-volumes"
+        )
     span = np.minimum(planes.last, TURN) - np.maximum(planes.first, 0)
     count = int(np.clip(2 ** np.ceil(np.log2(_FINE * TURN / np.mean(span))), _LEAST, _MOST)) if len(span) else _LEAST
     scale = np.float32(count / TURN)

@@ -72,7 +72,7 @@ class Fraction:
     shift: Any  #: of the steps, from 0 to 1 of one
 
 
-#: c of hd = c w / N: what smooths the staircase of N levels best (`tests/.../test_auto_width.py` fits it again).
+#: c of hd = c w / N: what smooths the staircase of N levels best (its test fits it again).
 AUTO_WIDTH = 0.4
 #: The same where pixels share the points, whose mean over a tile is no staircase: the least error in `fence`.
 AUTO_WIDTH_SHARED = 1.6

@@ -13,7 +13,7 @@ import pytest
 
 import realtime.methods.cloud_collectors as method
 from realtime.clouds.collector_search import Search
-from realtime.clouds.density_maps import dense_surface, light_depths
+from realtime.clouds.density_maps import dense_surface, light_depths, sun_depths
 from realtime.clouds.march import cloud_surfaces, depths_along, segment_through
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.camera import ray_directions
@@ -167,6 +167,22 @@ def test_the_map_of_a_sun_holds_the_depths_of_segments():
     deep = expected > 0.1
     assert np.abs(found - expected)[deep].mean() < 0.05
     assert found.mean() == pytest.approx(expected.mean(), rel=0.02)
+
+
+def test_maps_of_all_clouds_share_their_kernels():
+    """The number of a cloud is data: two clouds compile no more than one."""
+    shapes = {
+        name: cloud(name, placed(box((70.0, 60.0, 50.0)), (x, 0.0, 0.0), TURN), dense(waves(5), LOW, HIGH))
+        for name, x in (("first", -80.0), ("second", 80.0))
+    }
+    read = read_scene(mi.load_dict(cloud_scene(sun=SUN, **shapes)))
+    stride = dr.opaque(mi.Float, 1.0)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        sun_depths(cloud_surfaces(read), read.medium.clouds, read.lights, stride=stride)
+        hashes = [kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])]
+    half = len(hashes) // 2
+    assert hashes[:half] == hashes[half:]
 
 
 def test_the_surface_is_where_the_density_passes_the_threshold():

@@ -2,18 +2,21 @@
 """Area lights in frames: every method renders their points, frames follow moves, and spheres have their closed form."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
+import realtime.frame.renderer as renderer_module
+import realtime.scene.light_samples as module
 from realtime.area_lights.shape import turned_area_light
 from realtime.frame.incremental import next_frame
 from realtime.frame.renderer import image_frame, light_groups, render_frame, run_stages
 from realtime.methods.interface.method import Layers, Method
 from realtime.methods.registry import METHODS
 from realtime.scene.animate import with_area_lights
-from realtime.scene.light_samples import with_light_samples
+from realtime.scene.light_samples import light_samples, light_tables
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers import frames
 from tests.helpers.area_lights import BLACK, fog, lamp, lit_scene, ring
@@ -44,8 +47,7 @@ def one_by_one(variant, request):
     scene = scene_of(
         **({} if request.param == "rectangle" else {"changes": {"size": SIZE, "lamp": ring((0.9, 0.7, 1.9), size=0.6)}})
     )
-    lit = with_light_samples(scene, 5, "sobol")
-    for point in lit.lights:
+    for point in light_samples(scene, 5, "sobol"):
         alone = replace(scene, lights=(replace(point, source=None),), area_lights=())
         frame = frames.render(alone, "ray-march", steps=1200)
         airlight, surface = airlight + frame.airlight, surface + frame.surface
@@ -96,6 +98,55 @@ def test_many_lights_one_by_one_are_all_at_once(variant):
     np.testing.assert_array_equal(image_frame(apart, stages).airlight, frame.airlight)
     stages, _ = next_frame(apart, scene, cache, **still)
     np.testing.assert_array_equal(image_frame(apart, stages).airlight, frame.airlight)
+
+
+@dataclass(frozen=True)
+class Prepared(Method):
+    """A method that counts how often it prepares a light."""
+
+    name = "prepared"
+    uses_kernel = False
+    prepared_from = frozenset({"geometry", "light"})
+    made: ClassVar[list[int]] = []
+
+    def prepare(self, scene, light):
+        self.made.append(1)
+        return light.position
+
+    def airlight(self, view, light, state, kernel):
+        return light.intensity + 0 * view.distance
+
+
+def test_states_are_kept_for_all_lights_that_fit_and_samples_made_once_a_frame(variant, monkeypatch):
+    """Where nothing moved nothing is prepared again, however many lights there are; the samples are the same in all
+    stages of a frame."""
+    scene = scene_of(changes={"size": (16, 12)})
+    placed = []
+    place_points = module.place_points
+    monkeypatch.setattr(module, "place_points", lambda *which: (placed.append(1), place_points(*which))[1])
+    drawn = frames.renderer(scene, Prepared, points=40)
+    still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
+    _, cache = next_frame(drawn, scene, None, **still)
+    assert len(Prepared.made) == 40
+    placed.clear()
+    next_frame(drawn, scene, cache, **still)
+    assert len(Prepared.made) == 40
+    assert len(placed) == 1
+    # A state beyond the room for all is made when it is needed.
+    monkeypatch.setattr(renderer_module, "_ROOM", 3 * 12)
+    assert [state is None for state in drawn.prepare(scene)] == [False] * 3 + [True] * 37
+
+
+def test_the_power_of_a_light_is_its_intensity_times_its_solid_angle(variant):
+    """By these numbers a method draws lights: a wrong one is noise, and no error."""
+    spot = {"type": "spot", "to_world": mi.ScalarTransform4f().look_at([1, 2, 3], [0, 0, 0], [0, 0, 1])}
+    lamps = {
+        f"spot-{n}": spot | {"cutoff_angle": angle, "beam_width": angle / 2, "intensity": power}
+        for n, (angle, power) in enumerate([(30.0, 2.0), (60.0, 1.0), (80.0, 4.0)])
+    }
+    (table,) = light_tables(read(shaded(size=(16, 12), lamp=None, **lamps)).lights)
+    power = np.array([2.0, 1.0, 4.0]) * (1 - np.cos(np.radians([30.0, 60.0, 80.0])))
+    np.testing.assert_allclose(np.array(table.fractions), power / power.sum(), rtol=1e-6)
 
 
 def test_a_black_lamp_shadows_others_and_not_itself(variant):

@@ -9,6 +9,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import realtime.methods.shadow_planes.plane_table as module
+from realtime.errors import InputError
 from realtime.methods.shadow_planes.plane_table import NUMBER, index_planes, light_basis, planes_of_rays
 from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
 from realtime.methods.shadow_planes.sweep import ray_planes, sum_lit_intervals
@@ -141,6 +143,16 @@ def test_wedges_hold_every_plane_that_a_ray_crosses(variant, name, camera):
         assert sum(map(bool, missed)) <= 1
         assert all(len(set(numbers.tolist())) == len(numbers) for numbers in listed)
     assert crossed.any()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"), [("NUMBER", 2, "expected up to 3 of 31"), ("GAIN_ZERO", 1, "of up to 1 layers")]
+)
+def test_more_planes_or_layers_than_an_entry_holds_are_refused(variant, monkeypatch, name, value, words):
+    """They would spill into the bits of their neighbours: shadows that nobody cast."""
+    monkeypatch.setattr(module, name, value)
+    with pytest.raises(InputError, match=words):
+        index_of(occluders_of("box"))
 
 
 def test_wedges_stay_in_the_index_whatever_the_azimuth(variant):
