@@ -184,20 +184,25 @@ def _transform(medium: Any) -> Array:
     if rows is None or box is None:
         raise InputError(f"Mitsuba says nothing of the grid of the {medium.class_name()}; expected a 'gridvolume'")
     matrix = np.array([float(number) for number in re.findall(r"[-+\w.]+", rows[1])]).reshape(4, 4)[:3, :3]
-    return np.column_stack([matrix, 0.5 - matrix @ _middle(medium, box)])
+    middle, size = _box(medium, box)
+    if not np.any(matrix - np.diag(np.diagonal(matrix))):
+        matrix = np.diag(np.sign(np.diagonal(matrix)) / size)  # the words have six digits
+    return np.column_stack([matrix, 0.5 - matrix @ middle])
 
 
-def _middle(medium: Any, words: re.Match) -> Array:
-    """Return the middle of the box of a medium [m]: by Mitsuba's rays, to all digits."""
+def _box(medium: Any, words: re.Match) -> tuple[Array, Array]:
+    """Return the middle and the sides of the box of a medium [m]: by Mitsuba's rays, to all digits."""
     low, high = (np.array([float(number) for number in part.split(",")]) for part in words.groups())
     rough, size = 0.5 * (low + high), high - low
-    middle = np.empty(3)
+    middle = rough.copy()
     for axis in range(3):
         way = np.eye(3)[axis]
         start = mi.Point3f(*(float(c) for c in rough - way * (rough[axis] - low[axis] + size[axis])))
         meets, near, far = medium.intersect_aabb(mi.Ray3f(start, mi.Vector3f(*(float(c) for c in way))))
-        middle[axis] = float(start[axis][0]) + 0.5 * (float(near[0]) + float(far[0])) if meets[0] else rough[axis]
-    return middle
+        if meets[0]:
+            middle[axis] = float(start[axis][0]) + 0.5 * (float(near[0]) + float(far[0]))
+            size[axis] = float(far[0]) - float(near[0])
+    return middle, size
 
 
 def _compare(name: str, medium: Any, grid: DensityGrid) -> None:
