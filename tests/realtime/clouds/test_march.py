@@ -169,20 +169,21 @@ def test_the_map_of_a_sun_holds_the_depths_of_segments():
     assert found.mean() == pytest.approx(expected.mean(), rel=0.02)
 
 
-def test_maps_of_all_clouds_share_their_kernels():
-    """The number of a cloud is data: two clouds compile no more than one."""
+def test_maps_of_further_clouds_compile_nothing():
+    """The number of a cloud is data, and no part of the code of a kernel."""
     shapes = {
-        name: cloud(name, placed(box((70.0, 60.0, 50.0)), (x, 0.0, 0.0), TURN), dense(waves(5), LOW, HIGH))
-        for name, x in (("first", -80.0), ("second", 80.0))
+        f"cloud-{x:g}": cloud(
+            f"cloud-{x:g}", placed(box((40.0, 50.0, 30.0)), (x, 0.0, 0.0), TURN), dense(waves(5), LOW, HIGH)
+        )
+        for x in (-80.0, 0.0, 80.0)
     }
     read = read_scene(mi.load_dict(cloud_scene(sun=SUN, **shapes)))
-    stride = dr.opaque(mi.Float, 1.0)
+    surfaces, stride = cloud_surfaces(read), dr.opaque(mi.Float, 1.0)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
-        sun_depths(cloud_surfaces(read), read.medium.clouds, read.lights, stride=stride)
+        sun_depths(surfaces, read.medium.clouds, read.lights, stride=stride)
         hashes = [kernel["hash"] for kernel in dr.kernel_history([dr.KernelType.JIT])]
-    half = len(hashes) // 2
-    assert hashes[:half] == hashes[half:]
+    assert set(hashes[-4:]) <= set(hashes[:-4])
 
 
 def test_the_surface_is_where_the_density_passes_the_threshold():
