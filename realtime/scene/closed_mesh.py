@@ -9,12 +9,15 @@ seen from the point,
 
 **Convex bounds of media:** the half spaces of a closed convex mesh, or a sphere, read from Mitsuba's shapes.
 
-Facets that lie in one plane are one half space: a cube has 6, not 12. Vertices are float32 numbers, so "in one plane"
-and "convex" hold to 1e-5 of the size of the body; triangles thinner than that have no plane worth the name, and their
-neighbours bound the body without them.
+A mesh is convex if its surface is the one of its convex hull. The depth below the hull, the least
+distance to any of its planes, is concave along a triangle: with the depth d at the centroid and none
+below 0 it is at most 3 d anywhere. So the centroids alone decide, to 2e-5 of the size of the body.
+Facets that lie in one plane to the rounding of float32 vertices are one half space: a cube has 6,
+however finely it is divided. The hull merges them (Barber, Dobkin, Huhdanpaa 1996, *The quickhull
+algorithm for convex hulls*, ACM Transactions on Mathematical Software 22(4)).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import drjit as dr
@@ -104,9 +107,10 @@ def shape_number(shape: Any) -> int:
 
 
 _OUTWARDS = "normals that point outwards: change flip_normals, which a mirrored to_world of a mesh asks for too"
-FLAT = 1e-5  #: relative to the size of the body
+FLAT = 1e-5  #: how far a surface may lie from a convex one, relative to the size of the body
 CELLS = 8  #: of directions along each axis, by which walks over the facets find a place to begin
-_SOME = 64  # triangles by which most shapes that are not convex are told at once
+_ROUNDING = 2.0**-22  # of the largest coordinate: four times the rounding of a float32, as three of them add up
+_CHUNK = 1 << 22  # distances of points from planes that are in memory at once
 _SAMPLES = 1 << 16  # pairs of points for the mean distance: its standard error is 0.2 %
 
 
@@ -120,6 +124,8 @@ class Bounds:
     corners: Array  #: of the triangles, (triangles, 3, 3) [m]
     centre: Array  #: of a sphere that holds the body [m]
     radius: float  #: of that sphere [m]
+    #: pairs of planes that share an edge, each pair both ways and in order, (pairs, 2)
+    neighbours: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
     @property
     def is_sphere(self) -> bool:
@@ -165,40 +171,52 @@ def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any], mesh: ClosedMes
     outside, (faces, 3); `mesh`: the same as `closed_mesh` returns it, if it is known. Raises InputError for a mesh that
     is not closed, inside out or flat.
     """
+    from scipy.spatial import ConvexHull
+
     mesh = mesh or closed_mesh(name, vertices, faces)
     corners = vertices[faces]
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice = np.linalg.norm(area, axis=1)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     volume = np.sum((corners[:, 0] - vertices.mean(axis=0)) * area) / 6
     if not abs(volume) > FLAT * size**3 * 1e-3:
         raise _refusal(name, "has no volume", "a closed mesh around a body")
     if volume < 0:
         flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
         raise _refusal(name, flaw, _OUTWARDS)
-    sound = twice > FLAT * size * longest
-    normals = area[sound] / twice[sound, None]
-    offsets = np.mean(np.sum(corners[sound] * normals[:, None], axis=2), axis=1)
-    some = slice(None, None, max(1, len(normals) // _SOME))
-    if np.any(vertices @ normals[some].T > offsets[some] + 2 * FLAT * size):
-        return None
-    normals, offsets = _merged(normals, offsets, size)
-    if np.any(vertices @ normals.T > offsets + 2 * FLAT * size):
-        return None
+    # Around the middle of the body, so that the hull adds no rounding of its own.
     centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    rounding = _ROUNDING * float(np.abs(vertices).max())
+    hull = ConvexHull(mesh.vertices - centre, qhull_options=f"Qt C{rounding:g}")
+    # Qhull repeats the plane of each facet for all triangles that it divides the facet into.
+    planes, plane = np.unique(hull.equations, axis=0, return_inverse=True)
+    if not _on_surface(mesh, hull.simplices, planes, centre, max(FLAT * size, rounding)):
+        return None
+    plane = plane.reshape(-1)
+    beside = plane[hull.neighbors]
+    pairs = np.unique((plane[:, None] * len(planes) + beside)[beside != plane[:, None]])
+    neighbours = np.column_stack(np.divmod(pairs, len(planes)))
+    normals = planes[:, :3]
     radius = float(np.linalg.norm(vertices - centre, axis=1).max())
-    return Bounds(name, normals, offsets, corners, centre, radius)
+    offsets = normals @ centre - planes[:, 3]
+    return Bounds(name, normals, offsets, corners, centre, radius, neighbours)
 
 
-def _merged(normals: Array, offsets: Array, size: float) -> tuple[Array, Array]:
-    """Keep one plane of all that coincide."""
-    key = np.column_stack([normals, offsets / size])
-    kept: list[int] = []
-    for number, row in enumerate(key):
-        if not kept or np.abs(key[kept] - row).max(axis=1).min() > FLAT:
-            kept.append(number)
-    return normals[kept], offsets[kept]
+def _on_surface(mesh: ClosedMesh, simplices: NDArray[Any], planes: Array, centre: Array, depth: float) -> bool:
+    """Return whether the triangles of a mesh lie on its convex hull, no deeper than 2 `depth` [m] (see the module).
+
+    `simplices`: numbers of the vertices of the hull's triangles; `planes`: rows (normal, -offset) about the `centre`.
+    """
+    # Most triangles of smooth bodies are triangles of the hull.
+    count = len(mesh.vertices)
+    own, of_hull = (np.sort(part, axis=1) @ [count**2, count, 1] for part in (mesh.faces, simplices.astype(np.int64)))
+    others = np.flatnonzero(~np.isin(own, of_hull))
+    rows = max(1, _CHUNK // len(planes))
+    for first in range(0, len(others), rows):
+        points = mesh.corners[others[first : first + rows]].mean(axis=1) - centre
+        nearest = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        if np.any(nearest < -2 / 3 * depth):
+            return False
+    return True
 
 
 def _refusal(name: str, flaw: str, wanted: str) -> InputError:
@@ -206,30 +224,27 @@ def _refusal(name: str, flaw: str, wanted: str) -> InputError:
 
 
 def plane_neighbours(bounds: Bounds) -> NDArray[np.uint32]:
-    """Return by plane the planes that share an edge with it, filled up with its own number, (planes, most of any).
-
-    Planes through the same two corners, to the precision of the corners: where facets are tiny that may be more.
-    """
-    corners = np.unique(bounds.corners.reshape(-1, 3), axis=0)
-    on = np.abs(corners @ bounds.normals.T - bounds.offsets) < 4 * FLAT * bounds.radius
-    shared = on.T.astype(np.float32) @ on.astype(np.float32)
-    np.fill_diagonal(shared, 0)
-    rows = [np.flatnonzero(row >= 2) for row in shared]
-    table = np.repeat(np.arange(len(rows), dtype=np.uint32)[:, None], max(len(row) for row in rows), axis=1)
-    for number, row in enumerate(rows):
-        table[number, : len(row)] = row
+    """Return by plane the planes that share an edge with it, filled up with its own number, (planes, most of any)."""
+    plane, neighbour = bounds.neighbours.T
+    counts = np.bincount(plane, minlength=len(bounds.offsets))
+    table = np.repeat(np.arange(len(counts), dtype=np.uint32)[:, None], counts.max(), axis=1)
+    table[plane, np.arange(len(plane)) - np.repeat(np.cumsum(counts) - counts, counts)] = neighbour
     return table
 
 
 def radial_planes(bounds: Bounds) -> NDArray[np.uint32]:
     """Return by cell of directions from the centre a plane that is met there; cells are `CELLS` along each axis."""
     places = (np.arange(CELLS) + 0.5) * (2 / CELLS) - 1
-    z, y, x = np.meshgrid(places, places, places, indexing="ij")
-    along = np.stack([x, y, z], axis=-1).reshape(-1, 3) @ bounds.normals.T
     distance = bounds.offsets - bounds.normals @ bounds.centre
-    with np.errstate(divide="ignore"):
-        at = np.where(along > 0, distance / along, np.inf)
-    return at.argmin(axis=1).astype(np.uint32)
+    x, y, z = bounds.normals.T
+    first = np.empty((CELLS, CELLS, CELLS), dtype=np.uint32)
+    for layer, row, column in np.ndindex(first.shape):  # one at a time: there may be many planes
+        along = places[layer] * z + places[row] * y + places[column] * x
+        with np.errstate(divide="ignore"):
+            at = distance / along
+        at[along <= 0] = np.inf
+        first[layer, row, column] = at.argmin()
+    return first.ravel()
 
 
 def holds(bounds: Bounds, point: Array) -> bool:
