@@ -284,8 +284,14 @@ def _require_constant(medium, *coefficients: str) -> None:
 
 
 def _check_albedo(albedo) -> None:
-    if np.any(albedo > 1 + 1e-6):
+    if not np.all((albedo >= 0) & (albedo <= 1 + 1e-6)):
         raise InputError(f"the medium's albedo is {np.round(albedo, 6).tolist()}; expected values from 0 to 1")
+
+
+def _check_coefficient(name: str, values) -> None:
+    if not np.all(np.isfinite(values) & (values >= 0)):
+        given = np.asarray(values).tolist()
+        raise InputError(f"the medium's {name} is {given}; expected finite values of 0 or more [1/m]")
 
 
 def _is_height_fog(medium) -> bool:
@@ -296,6 +302,8 @@ def _height_fog(medium, types: ArrayTypes) -> HeightFog:
     """Read a medium whose extinction is a volume of type `heightfog`, which answers for its numbers."""
     parameters = mi.traverse(medium)
     scale = float(parameters["scale"])
+    for name in ("sigma_0", "sigma_1", "sigma_2"):
+        _check_coefficient(f"scale times {name}", scale * float(parameters[f"sigma_t.{name}"][0]))
 
     def number(name: str, factor: float = 1.0):
         return dr.opaque(types.scalar, factor * float(parameters[f"sigma_t.{name}"][0]))
@@ -333,9 +341,8 @@ def _homogeneous(medium, types: ArrayTypes) -> Homogeneous:
     dr.eval(sigma_s, sigma_t)  # in one kernel: Mitsuba's scale is a literal in it
     scattering = np.array(sigma_s, dtype=np.float64).reshape(-1)
     extinction = np.array(sigma_t, dtype=np.float64).reshape(-1)
-    for name, values in (("sigma_t", extinction), ("sigma_s = albedo sigma_t", scattering)):
-        if not np.all(np.isfinite(values)) or np.any(values < 0):
-            raise InputError(f"the medium's {name} is {values.tolist()}; expected finite values of 0 or more [1/m]")
+    _check_coefficient("sigma_t", extinction)
+    _check_coefficient("sigma_s = albedo sigma_t", scattering)
     albedo = np.divide(scattering, extinction, out=np.zeros(3), where=extinction > 0)
     _check_albedo(albedo)
     grey = extinction[0] == extinction[1] == extinction[2]
@@ -353,7 +360,10 @@ def _read_phase(phase, types: ArrayTypes) -> Phase:
         )
     parameters = mi.traverse(phase)
     if name == "hg":
-        return HenyeyGreenstein(dr.opaque(types.scalar, float(parameters["g"][0])))
+        g = float(parameters["g"][0])
+        if not abs(g) < 1:
+            raise InputError(f"the phase function's g is {g:g}; expected a mean cosine between -1 and 1")
+        return HenyeyGreenstein(dr.opaque(types.scalar, g))
     if name == "tabulated":
         values = np.array(parameters["values"], dtype=np.float64)
         # The mean over the sphere is half the integral over the cosine: the trapezoidal rule is exact on linear pieces.

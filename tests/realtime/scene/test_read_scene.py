@@ -8,11 +8,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.numerics.array_types import array_types
 from realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
+from validation.scenes.height_fog import register_height_fog
 from validation.scenes.loading import load_scene
 from validation.study.configuration import configuration, prepared
 
@@ -63,6 +65,32 @@ def test_a_second_camera_is_noted(variant):
     """The first is used, and anyone who meant the other is told."""
     (note,) = read(other={"type": "perspective", "medium": {"type": "ref", "id": "fog"}}).features.notes
     assert "2 cameras: the first is used" in note
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"albedo": -0.5}, r"albedo.* is \[-"),
+        ({"albedo": float("nan")}, r"albedo.* is \[nan"),
+        ({"scale": -1.0}, "-.*expected (a finite number|finite values) of 0 or more"),
+        ({"phase": {"type": "hg", "g": float("nan")}}, "g is nan"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["homogeneous", "grid", "height fog"])
+def test_numbers_that_no_medium_has_are_refused_whoever_built_the_scene(variant, kind, changes, words):
+    """`validation.scenes.loading` looks at files; a scene from Python comes here at once."""
+    register_height_fog()
+    box = {"to_world": mi.ScalarTransform4f().translate([-9.0, -9.0, -9.0]).scale(18.0)}
+    grid = {"type": "gridvolume", "grid": mi.VolumeGrid(np.ones((2, 2, 2, 1), np.float32))}
+    layers = {"type": "heightfog", "sigma_1": 0.1, "H_1": 1.0, "z_1": 0.0}
+    volumes = {"grid": grid | box, "height fog": layers | box}
+    fog = {"type": "homogeneous", "id": "fog", "sigma_t": 0.3, "albedo": 0.8}
+    if kind != "homogeneous":
+        fog |= {"type": "heterogeneous", "sigma_t": volumes[kind]}
+    assert read(fog=fog).medium.channels == 1
+    with pytest.raises(InputError, match=words) as refusal:
+        read(fog=fog | changes)
+    assert "\n" not in str(refusal.value)
 
 
 # The camera ----------------------------------------------------------------------------------------------------------
