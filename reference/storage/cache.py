@@ -10,13 +10,16 @@ nothing.
 """
 
 import hashlib
+import logging
 import os
+import random
 import re
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -24,14 +27,14 @@ from typing import Any
 import numpy as np
 
 from analytic.errors import InputError
-from reference.storage.files import sweep_hidden, write_bytes
+from reference.storage.files import NO_SPACE, sweep_hidden, write_bytes
 
 DEFAULT_LIMIT = 4 * 2**30  #: bytes
 
 _DIGEST = "digest"  # the name of the digest among the arrays
 _KIND = re.compile(r"([a-z]+(?:-[a-z]+)*)-[0-9a-f]{32}")
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kmgt]?)(i?)b?", flags=re.IGNORECASE)
-_written = 0  # bytes that this process has added since it last looked at the size of the cache
+_LOOK = 100  # how often the size of the cache is looked at, on average, while a whole limit is written
 
 
 @dataclass(frozen=True)
@@ -69,10 +72,12 @@ def cache_limit() -> int:
 
 
 def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] | None:
-    """Return the arrays under a key, or None if the file is missing or damaged.
+    """Return the arrays under a key, or None if the file is missing or damaged, or the limit of the cache is 0.
 
     With `names` it returns these arrays alone, without a check of the digest: to look at a small part of a large file.
     """
+    if cache_limit() == 0:
+        return None
     try:
         # Opened here, since `np.load` leaves a file that it cannot read open.
         with open(_path(key), "rb") as file, np.load(file, allow_pickle=False) as stored:
@@ -92,28 +97,48 @@ def load_arrays(key: str, names: Sequence[str] | None = None) -> dict[str, Any] 
 def store_arrays(key: str, arrays: Mapping[str, Any]) -> None:
     """Write arrays under a key, replacing what is there; a key may name a folder, as in 'volpath-0a1b/000017'.
 
-    Then the files that were used longest ago are removed until the cache is no larger than its limit. A process looks
-    at the size of the cache when it has added a hundredth of the limit.
+    Then the files that were used longest ago are removed until the cache is no larger than its limit. The size of the
+    cache is looked at by chance, the more often the larger the file is. With a limit of 0 nothing is written. Where the
+    folder cannot be written a note on the error stream says so: the arrays are there all the same. Raises OSError where
+    the disk is full.
     """
-    global _written
     limit = cache_limit()
+    if limit == 0:
+        return
     content: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
     buffer = BytesIO()
     np.savez(buffer, **(content | {_DIGEST: np.asarray(_content_digest(key, content))}))
     try:
-        # Not flushed, which takes half the time of a small file: one that a loss of power damages counts as missing.
-        write_bytes(_path(key), buffer.getvalue(), flush=False)
-    except FileNotFoundError:  # the folder was empty, and another process has just removed it
-        write_bytes(_path(key), buffer.getvalue(), flush=False)
-    _written += len(buffer.getvalue())
-    if _written > limit / 100:
-        _written = 0
+        _write(_path(key), buffer.getvalue())
+    except (InputError, OSError) as error:
+        if getattr(error, "errno", None) in NO_SPACE:
+            raise
+        _note_unwritable(cache_folder())
+        return
+    if random.random() < _LOOK * len(buffer.getvalue()) / limit:
         remove_oldest(limit)
 
 
+def _write(path: Path, data: bytes) -> None:
+    # Not flushed, which takes half the time of a small file: one that a loss of power damages counts as missing.
+    try:
+        write_bytes(path, data, flush=False)
+    except FileNotFoundError:  # the folder was empty, and another process has just removed it
+        write_bytes(path, data, flush=False)
+
+
+@cache  # once for each folder
+def _note_unwritable(folder: Path) -> None:
+    logging.getLogger("airlight").warning(
+        "airlight: note: the cache folder %s cannot be written, so nothing is cached: name one that can be written by "
+        "AIRLIGHT_CACHE_DIR, or set AIRLIGHT_CACHE_SIZE=0",
+        folder,
+    )
+
+
 def is_stored(key: str) -> bool:
-    """Return whether there is a file under a key, damaged or not."""
-    return _path(key).exists()
+    """Return whether there is a file under a key, damaged or not; none where the limit of the cache is 0."""
+    return cache_limit() > 0 and _path(key).exists()
 
 
 def drop_arrays(key: str) -> None:

@@ -28,7 +28,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache, partial, update_wrapper
 from pathlib import Path
 from types import CodeType
@@ -38,7 +38,7 @@ import msgspec
 import numpy as np
 
 from analytic.clock import Spent, stopwatch
-from reference.storage.cache import drop_parts, is_stored, load_arrays, store_arrays
+from reference.storage.cache import drop_arrays, drop_parts, is_stored, load_arrays, store_arrays
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("analytic", "realtime", "reference", "validation", "reports")
@@ -102,18 +102,19 @@ class KeptFunction(Generic[P, T]):
         """Return whether the value is kept already."""
         return is_kept(self.key(*given, **others))
 
-    def key(self, *given: Any, **others: Any) -> str:
-        """Return the key of the value; what decides nothing may be missing."""
+    def key(self, *given: Any, **others: Any) -> str | None:
+        """Return the key of the value, None if it cannot be kept; what decides nothing may be missing."""
         bound = self._signature.bind_partial(*given, **others)
         bound.apply_defaults()
         kinds = self._signature.parameters
         decides = {name: each for name, each in bound.arguments.items() if kinds[name].kind != _ONLY_BY_NAME}
         return key_of(self._kind, *self._code, **decides)
 
-    def _store(self, key: str, value: T, spent: Spent) -> Kept[T]:
+    def _store(self, key: str | None, value: T, spent: Spent) -> Kept[T]:
         arrays = _packed(value)
-        kept = store(key, arrays, spent) if self._worth(value) else Kept(arrays, spent, time.time(), False)
-        drop_parts(key)
+        kept = store(key if self._worth(value) else None, arrays, spent)
+        if key is not None:
+            drop_parts(key)
         return self._result(kept)  # as it will come from the disk
 
     def _result(self, kept: "Kept[dict[str, Any]]") -> Kept[T]:
@@ -154,21 +155,24 @@ def _unpacked(arrays: Mapping[str, Any], kind: Any) -> Any:
     return msgspec.convert(tree, kind, dec_hook=lambda _, each: each)
 
 
-def key_of(kind: str, /, *functions: Any, **arguments: Any) -> str:
-    """Return the key under which a result is kept.
+def key_of(kind: str, /, *functions: Any, **arguments: Any) -> str | None:
+    """Return the key under which a result is kept; None for a scene that nobody can tell from another.
 
     `kind`: one or more words with dashes: a file name begins with it; `functions`: the functions that compute it, or
     names of modules of ours; `arguments`: what the result depends on besides: numbers, words, arrays, paths, Mitsuba
     scenes, and tuples, dictionaries and data classes of these.
     """
-    content = {"arguments": arguments, "code": source_digest(*functions)}
-    return f"{kind}-{hashlib.sha256(json.dumps(content, sort_keys=True, default=_plain).encode()).hexdigest()[:32]}"
+    try:
+        content = {"arguments": _plain(arguments), "code": source_digest(*functions)}
+    except _NoDigestError:
+        return None
+    return f"{kind}-{hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]}"
 
 
-def load(key: str) -> Kept[dict[str, Any]] | None:
+def load(key: str | None) -> Kept[dict[str, Any]] | None:
     """Return the arrays of a key; None if it is missing, damaged or, in a fresh run, older than the run."""
     loading = stopwatch()
-    arrays = load_arrays(key) if is_kept(key) else None
+    arrays = load_arrays(key) if key is not None and is_kept(key) else None
     if arrays is None:
         return None
     seconds, processor, made = (float(arrays.pop(name)) for name in _ABOUT)
@@ -177,22 +181,29 @@ def load(key: str) -> Kept[dict[str, Any]] | None:
     return Kept(arrays, spent, made, True)
 
 
-def store(key: str, arrays: Mapping[str, Any], spent: Spent) -> Kept[dict[str, Any]]:
-    """Keep arrays, and what they took."""
+def store(key: str | None, arrays: Mapping[str, Any], spent: Spent) -> Kept[dict[str, Any]]:
+    """Keep arrays, and what they took; without a key they are returned alone."""
     made = time.time()
-    store_arrays(key, {**arrays, **dict(zip(_ABOUT, (spent.seconds, spent.processor, made)))})
+    if key is not None:
+        store_arrays(key, {**arrays, **dict(zip(_ABOUT, (spent.seconds, spent.processor, made)))})
     return Kept(dict(arrays), spent, made, False)
 
 
-def is_kept(key: str) -> bool:
+def is_kept(key: str | None) -> bool:
     """Return whether there is a result under a key that `load` may return; damage is not looked for."""
-    found = load_arrays(key, ("made",))
+    found = None if key is None else load_arrays(key, ("made",))
     return found is not None and float(found["made"]) >= float(os.environ.get(_FRESH, 0))
 
 
-def is_damaged(key: str) -> bool:
+def is_damaged(key: str | None) -> bool:
     """Return whether there is a file under a key that cannot be read, or is not what was written."""
-    return is_stored(key) and load_arrays(key) is None
+    return key is not None and is_stored(key) and load_arrays(key) is None
+
+
+def drop(key: str | None) -> None:
+    """Remove what there is under a key."""
+    if key is not None:
+        drop_arrays(key)
 
 
 @contextmanager
@@ -245,6 +256,8 @@ def source_digest(*functions: Any) -> str:
 def code_digest(starts: Iterable[Path]) -> str:
     """Return a digest of the code of some modules and of all that they import, as far as it is ours or the user's.
 
+    Data count with the code that may read them: the files in the folders of our modules (tables of scenes, certified
+    values, claims).
     From a file of the user's, which may lie anywhere, the modules beside it are followed, and those of its package.
     """
     waiting, seen = [path.resolve() for path in starts], dict[Path, bytes]()
@@ -253,6 +266,8 @@ def code_digest(starts: Iterable[Path]) -> str:
         if path not in seen:
             seen[path], names = _compiled(path, path.stat().st_mtime_ns)
             waiting += _imported(path, names)
+    for folder in {path.parent for path in seen if _is_ours(path)}:
+        seen |= {path: hashlib.sha256(_source(path)).digest() for path in _data(folder)}
     digest = hashlib.sha256()
     for path in sorted(seen):
         # Not the whole path: the same code has the same digest wherever it is installed.
@@ -289,6 +304,15 @@ def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
         return hashlib.sha256(_source(path)).digest(), frozenset()
     # Version 2 of the format has no references, which depend on what else is in memory.
     return hashlib.sha256(marshal.dumps(code, 2)).digest(), frozenset(names)
+
+
+def _data(folder: Path) -> Iterator[Path]:
+    """Yield the files of a folder of ours that are no modules, those of folders without modules below it too."""
+    for path in folder.iterdir():
+        if path.is_dir() and path.name != "__pycache__" and not any(path.glob("*.py")):
+            yield from _data(path)
+        elif path.is_file() and path.suffix not in (".py", ".pyc"):
+            yield path
 
 
 def _source(path: Path) -> bytes:
@@ -334,16 +358,33 @@ def _is_ours(path: Path) -> bool:
     return path.is_relative_to(_ROOT) and path.relative_to(_ROOT).parts[0] in _PACKAGES
 
 
+class _NoDigestError(Exception):
+    """Raised for a scene that has no digest."""
+
+
 def _plain(value: Any) -> Any:
-    """Return an argument as what JSON can hold."""
-    if isinstance(value, np.ndarray):
-        return [value.dtype.str, value.shape, hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()]
+    """Return an argument as what JSON can hold; TypeError for what has no content that is the same in every process."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, tuple | list):
+        return [_plain(each) for each in value]
+    if isinstance(value, Mapping) and all(isinstance(name, str) for name in value):
+        return {name: _plain(each) for name, each in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        return [type(value).__name__, {each.name: _plain(getattr(value, each.name)) for each in fields(value)}]
     if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Mapping):
-        return dict(value)
+        return [value.dtype.str, value.item()]
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biufcSU":
+        return [value.dtype.str, value.shape, hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()]
+    if isinstance(value, Path):
+        return [value.name, hashlib.sha256(value.read_bytes()).hexdigest()]
     if type(value).__module__ == "mitsuba" and type(value).__name__ == "Scene":
         from reference.storage.scene_digest import scene_digest  # imports Mitsuba
 
-        return scene_digest(value)
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else str(value)
+        digest = scene_digest(value)
+        if digest is None:
+            raise _NoDigestError
+        return digest
+    raise TypeError(
+        f"{type(value).__name__} cannot be part of a key: expected numbers, words, arrays or records of these"
+    )

@@ -1,9 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A digest of a scene as Mitsuba holds it: every parameter of every plugin, every vertex."""
+"""A digest of a scene: of every property of every object, every vertex, every value of every file.
+
+Mitsuba tells Python the parameters of its objects, their classes and a few properties beside them. That is everything
+where all classes are in `_WHOLE`. Others have properties that nobody can ask for once they are built: how a texture or
+a grid is filtered and what lies beyond it. A scene with such an object has a digest if it carries one of its
+description, the nodes of Mitsuba's parser and the files that they name, or the code that built it: those who load
+scenes leave that as the id of the scene, since Mitsuba's scenes take no other mark. Any other scene has none: results
+of it are not kept.
+"""
 
 import hashlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -12,40 +21,130 @@ import numpy as np
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
 
+#: Classes of which parameters and `_beside` tell all. Filters of films and samplers count for nothing: no estimator
+#: and no method uses them.
+_WHOLE = {
+    *("Scene", "PerspectiveCamera", "HDRFilm", "IndependentSampler", "BoxFilter", "GaussianFilter"),
+    *("PointLight", "SpotLight", "DirectionalEmitter", "AreaLight", "ConstantBackgroundEmitter"),
+    *("HomogeneousMedium", "ConstVolume", "UniformSpectrum", "SRGBReflectanceSpectrum"),
+    *("IsotropicPhaseFunction", "HGPhaseFunction", "RayleighPhaseFunction", "TabulatedPhaseFunction"),
+    *("Null", "SmoothDiffuse", "TwoSidedBRDF", "SmoothConductor"),
+    *("Sphere", "Disk", "Rectangle", "Cube", "Mesh", "OBJMesh", "PLYMesh"),
+}
+_DESCRIPTION = "description "  # before the digest of a description in the id of a scene
 
-def scene_digest(scene) -> str:
-    """Return a digest of a Mitsuba scene: of every parameter of every plugin in it."""
+
+class _UnknownError(Exception):
+    """Raised for a value of which there are no bytes that are the same in the next run."""
+
+
+def scene_digest(scene) -> str | None:
+    """Return a digest of a Mitsuba scene; None if it has properties that neither Mitsuba nor its description tells."""
+    described = scene.id() if scene.id().startswith(_DESCRIPTION) else ""
+    try:
+        digest = _built_digest(scene)
+    except _UnknownError:
+        return None
+    if not (described or is_whole(scene)):
+        return None
+    return hashlib.sha256(f"{digest} {described}".encode()).hexdigest()
+
+
+def build_scene(description: Mapping[str, Any]) -> Any:
+    """Return the Mitsuba scene of a dictionary, as `mi.load_dict`, with the digest of its description."""
+    scene = mi.load_dict(dict(description))
+    if isinstance(scene, mi.Scene) and not is_whole(scene):
+        config = mi.parser.ParserConfig(mi.variant())
+        give_description(scene, description_digest(mi.parser.parse_dict(config, dict(description))))
+    return scene
+
+
+def give_description(scene, digest: str | None) -> None:
+    """Let a scene carry a digest of its description; None where it has none."""
+    scene.set_id("" if digest is None else _DESCRIPTION + digest)
+
+
+def description_digest(state: Any) -> str | None:
+    """Return a digest of the nodes of a parsed scene and of the files that they name; None if a value has none.
+
+    Call it before `mi.parser.instantiate`, which takes the nodes apart, with the file resolver of the scene.
+    """
     digest = hashlib.sha256()
-    parameters = mi.traverse(scene)
-    for words in _kinds(scene):
-        digest.update(_ADDRESS.sub("", words).encode())
-    for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
-        digest.update(_ADDRESS.sub("", key).encode())
-        digest.update(_value_bytes(parameters[key]))
+    try:
+        for node in state.nodes:
+            props = node.props
+            digest.update(f"|{props.plugin_name()} {_ADDRESS.sub('', props.id())}".encode())
+            for key in list(props.keys()):
+                queried = props.was_queried(key)
+                digest.update(f"|{key} {props.type(key)} ".encode() + _property_bytes(props[key]))
+                props.mark_queried(key, queried)
+    except _UnknownError:
+        return None
     return digest.hexdigest()
 
 
-def _kinds(scene) -> Iterator[str]:
-    """Yield what decides the numbers but is no parameter: the kinds of the plugins, and which way surfaces face."""
+def is_whole(scene) -> bool:
+    """Return whether Mitsuba tells every property of a scene, or of another object, that is built."""
+    return {part.class_name() for part in mi.traverse(scene).hierarchy} <= _WHOLE
+
+
+def _built_digest(scene) -> str:
+    """Return a digest of all that Mitsuba tells of a scene, or of another object, that is built."""
+    digest = hashlib.sha256()
+    parameters = mi.traverse(scene)
+    for part in parameters.hierarchy:
+        digest.update(f"|{part.class_name()}".encode())
+    for words in _beside(scene) if isinstance(scene, mi.Scene) else ():
+        digest.update(f"|{_ADDRESS.sub('', words)}".encode())
+    for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
+        digest.update(f"|{_ADDRESS.sub('', key)} ".encode() + _value_bytes(parameters[key]))
+    return digest.hexdigest()
+
+
+def _beside(scene) -> Iterator[str]:
+    """Yield what decides the numbers but is no parameter: which way surfaces face, and which media are where."""
     for sensor in scene.sensors():
-        yield sensor.class_name()
         yield _medium_words(sensor.get_medium())
-    for emitter in scene.emitters():
-        yield emitter.class_name()
     for shape in scene.shapes():
         yield f"{shape.class_name()} {shape.has_flipped_normals()} {shape.bsdf()}"
         yield f"inside {_medium_words(shape.interior_medium())}, outside {_medium_words(shape.exterior_medium())}"
 
 
 def _medium_words(medium: Any) -> str:
-    # An isotropic and a Rayleigh phase function have no parameters: they differ by their names alone.
-    return "no medium" if medium is None else f"{medium} {medium.phase_function()}"
+    return "no medium" if medium is None else f"{medium.id()} {medium} {medium.phase_function()}"
+
+
+def _property_bytes(value: Any) -> bytes:
+    """Return the bytes of a property of a node."""
+    if isinstance(value, mi.Properties.ResolvedReference):
+        return str(value.index()).encode()
+    if isinstance(value, mi.Properties.Reference):
+        return value.id().encode()
+    if hasattr(value, "wavelengths"):  # a spectrum, whose type has no name of its own in every variant
+        return _value_bytes(value.wavelengths) + b"|" + _value_bytes(value.values)
+    if isinstance(value, str):
+        path = Path(str(mi.file_resolver().resolve(value)))
+        return hashlib.sha256(path.read_bytes()).digest() if path.is_file() else value.encode()
+    if isinstance(value, mi.Bitmap):
+        words = f"{value.pixel_format()} {value.component_format()} {value.srgb_gamma()} {value.premultiplied_alpha()}"
+        return words.encode() + _value_bytes(np.array(value))
+    if isinstance(value, mi.VolumeGrid):
+        return _value_bytes(np.array(value))
+    if isinstance(value, mi.Object):
+        if not is_whole(value):
+            raise _UnknownError
+        return _built_digest(value).encode()
+    return _value_bytes(value)
 
 
 def _value_bytes(value: Any) -> bytes:
+    """Return the bytes of a number, a word, an array, or a transform."""
+    if isinstance(value, str):
+        return value.encode()
     # The name of the type decides: a colour has a `matrix` too, a swizzle that holds its first channel six times.
     matrix = value.matrix if "Transform" in type(value).__name__ else value
     try:
-        return np.array(matrix, dtype=np.float64).tobytes()
-    except (TypeError, ValueError):
-        return repr(value).encode()
+        array = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise _UnknownError from error
+    return f"{array.shape} ".encode() + array.tobytes()

@@ -9,6 +9,7 @@ from typing import Any
 import mitsuba as mi
 
 from analytic.errors import InputError
+from reference.storage.scene_digest import build_scene
 from reports.api.inputs import one_error, pixels_of
 from validation.scenes.bodies import check_bodies
 from validation.scenes.loading import LoadedScene, load_scene, name_shapes, resize
@@ -75,7 +76,7 @@ def _as_open(loaded: LoadedScene) -> OpenScene:
 
 def _from_dictionary(scene: Mapping[str, Any], pixels: tuple[int, int] | None) -> OpenScene:
     try:
-        built = mi.load_dict(dict(scene))
+        built = build_scene(scene)
     except Exception as error:  # Mitsuba reports every kind of bad input as a RuntimeError, Python plugins as anything
         raise InputError(f"scene: Mitsuba cannot build the dictionary: {' '.join(str(error).split())}") from error
     loaded = _from_mitsuba(built)

@@ -75,10 +75,16 @@ def layered_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: 
     extent = {"airlight_se": reference.airlight_se, "surface_se": reference.surface_se, "emitted": reference.emitted}
     layers |= {layer: values for layer, values in extent.items() if values is not None}
     made: dict[str, str | int | float] = {"airlight:scene": loaded.name, "airlight:estimator": "quadrature"}
-    made |= {"airlight:pixel": pixel, "airlight:scene_digest": scene_digest(loaded.scene)}
+    made |= {"airlight:pixel": pixel, **_digest_of(loaded)}
     if reference.airlight_se is not None:
         made["airlight:batches"] = REPLICATES
     return Image(layers, reference.distance, made)
+
+
+def _digest_of(loaded: LoadedScene) -> dict[str, str]:
+    """Return the attribute that says of which scene an image is, none where nobody can tell."""
+    digest = scene_digest(loaded.scene)
+    return {} if digest is None else {"airlight:scene_digest": digest}
 
 
 @dataclass(frozen=True)
@@ -205,7 +211,7 @@ def _layered_batches(loaded: LoadedScene, estimator: str, batches: Batches, *, d
         layers[f"{name}_se"] = batches.standard_error[number].reshape(shape)
     attributes: dict[str, str | int | float] = {
         "airlight:scene": loaded.name,
-        "airlight:scene_digest": scene_digest(loaded.scene),
+        **_digest_of(loaded),
         "airlight:estimator": estimator,
         "airlight:spp": batches.samples * len(batches.seeds),
         "airlight:batch_spp": batches.samples,

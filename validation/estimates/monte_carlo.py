@@ -28,9 +28,9 @@ from reference.monte_carlo.volpath import volpath_batch, volpath_orders_batch
 from reference.quadrature.surface import surface_hits
 from reference.scene.clouds import read_clouds
 from reference.scene.read import read_reference
-from reference.storage.cache import cache_folder, drop_arrays
+from reference.storage.cache import cache_folder
 from reference.storage.files import NO_SPACE
-from reference.storage.kept import add_spent, is_damaged, is_kept, key_of, load, stopwatch_from_nothing, store
+from reference.storage.kept import add_spent, drop, is_damaged, is_kept, key_of, load, stopwatch_from_nothing, store
 from validation.arrays import Counted
 from validation.estimates.quadrature import check_camera, check_rays
 
@@ -175,7 +175,7 @@ def batch_tracer(
     raise ValueError(f"{given}, expected one of {', '.join(ESTIMATORS)}")
 
 
-def _has(folder: str, seed: int) -> bool:
+def _has(folder: str | None, seed: int) -> bool:
     """Return whether the batch of a seed is kept, alone or in its block."""
     start = seed // BLOCK * BLOCK
     return any(is_kept(_name(folder, seeds)) for seeds in (range(seed, seed + 1), range(start, start + BLOCK)))
@@ -196,7 +196,7 @@ def _blocks(first_seed: int, batches: int) -> Iterator[range]:
 
 
 def _block(
-    folder: str,
+    folder: str | None,
     seeds: range,
     samples: int,
     layers: tuple[str, ...],
@@ -218,22 +218,24 @@ def _block(
     if full and block is not None:
         _store(folder, block, spent())
         for seed in seeds:
-            drop_arrays(_name(folder, range(seed, seed + 1)))
+            drop(_name(folder, range(seed, seed + 1)))
     return block, True
 
 
-def _name(folder: str, seeds: range) -> str:
-    return f"{folder}/{seeds[0]:06d}" + (f"-{seeds[-1]:06d}" if len(seeds) > 1 else "")
+def _name(folder: str | None, seeds: range) -> str | None:
+    return None if folder is None else f"{folder}/{seeds[0]:06d}" + (f"-{seeds[-1]:06d}" if len(seeds) > 1 else "")
 
 
-def _store(folder: str, batches: Batches, spent: Spent) -> None:
+def _store(folder: str | None, batches: Batches, spent: Spent) -> None:
     arrays: dict[str, Any] = {"mean": batches.mean, "totals": batches.totals}
     # One batch has no spread.
     arrays |= {"squares": batches.squares} if len(batches.seeds) > 1 else {}
     store(_name(folder, range(batches.seeds[0], batches.seeds[-1] + 1)), arrays, spent)
 
 
-def _load(folder: str, seeds: range, samples: int, layers: tuple[str, ...], tally: Counter[str]) -> Batches | None:
+def _load(
+    folder: str | None, seeds: range, samples: int, layers: tuple[str, ...], tally: Counter[str]
+) -> Batches | None:
     name = _name(folder, seeds)
     kept = load(name)
     if kept is None:

@@ -46,7 +46,7 @@ from validation.arrays import Array, Bools, Counted
 _ROUNDING = 2.0**-24
 
 
-@kept("quadrature", quadrature_image)
+@kept("quadrature")
 def reference_image(
     scene,
     checks: int = 32,
@@ -98,12 +98,13 @@ def _checked_image(
     return image
 
 
-def _parts(key: str) -> Keep:
+def _parts(key: str | None) -> Keep:
     """Return a store for parts of a reference until it is done: a run that was interrupted goes on from them."""
 
     def keep(name: str, work: Callable[[], Mapping[str, Any]]) -> Mapping[str, Any]:
-        found, spent = load(f"{key}/{name}"), stopwatch()
-        return (found or store(f"{key}/{name}", work(), spent())).value
+        part = None if key is None else f"{key}/{name}"
+        found, spent = load(part), stopwatch()
+        return (found or store(part, work(), spent())).value
 
     return keep
 

@@ -28,6 +28,7 @@ import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError, named_values, nearest
+from reference.storage.scene_digest import description_digest, give_description
 from validation.arrays import Array
 from validation.scenes.height_fog import NUMBERS
 from validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
@@ -331,8 +332,11 @@ def scene_with_lobes(description: dict[str, Any], lobes: Mapping[str, float]):
     config.merge_meshes = False
     state = mi.parser.parse_dict(config, description)
     give_lobes(state, lobes)
+    digest = description_digest(state)
     mi.parser.transform_all(config, state)
-    return mi.parser.instantiate(config, state)
+    scene = mi.parser.instantiate(config, state)
+    give_description(scene, digest)
+    return scene
 
 
 def give_lobes(state: Any, lobes: Mapping[str, float]) -> None:

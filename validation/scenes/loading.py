@@ -4,6 +4,7 @@
 import hashlib
 import os
 import re
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -16,7 +17,8 @@ from xml.parsers import expat
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
-from reference.storage.scene_digest import scene_digest
+from reference.storage.kept import source_digest
+from reference.storage.scene_digest import give_description, is_whole, scene_digest
 from validation.scenes.bodies import check_bodies
 from validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes
 from validation.scenes.height_fog import register_height_fog
@@ -60,6 +62,8 @@ def load_scene(
     path = Path()
     if record is not None:
         built = mi.load_dict(record.build(), optimize=False)
+        if record.digest and not is_whole(built):
+            give_description(built, f"{record.name} {source_digest('validation.scenes.registry')}")
         loaded = LoadedScene(record.name, built, record.purpose, record.published, animation=record.animation)
     else:
         path = _existing(name_or_path)
@@ -95,7 +99,10 @@ def scene_stem(name_or_path: str) -> str:
 
 
 def scene_identity(scene: str) -> str:
-    """Return the identity of a scene: a name or seed with a digest of its description, the digest of a file's scene."""
+    """Return the identity of a scene: a name or seed with a digest of its description, the digest of a file's scene.
+
+    A scene that has no digest has an identity of its own each time: what is made of it is never found again.
+    """
     if scene in SCENES:
         return f"{scene} {SCENES[scene].digest}"
     if is_random(scene):
@@ -104,7 +111,7 @@ def scene_identity(scene: str) -> str:
         files = [RANGES, *([ranges] if ranges else []), *(sorted(Path(meshes).iterdir()) if meshes else [])]
         stamps = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in files if path.is_file())
         return f"{PREFIX}{seed} {ranges is not None} {_files_digest(stamps)}"
-    return scene_digest(load_scene(scene).scene)
+    return scene_digest(load_scene(scene).scene) or f"no digest, {time.time_ns()}"
 
 
 @lru_cache(maxsize=8)

@@ -58,7 +58,7 @@ def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) ->
 
     `scenes` are digests of scenes that were read before, by name: anyone who has many cells of a file reads it once.
     """
-    return key_of(
+    key = key_of(
         "row",
         scene=(scenes or {}).get(cell.scene) or scene_identity(cell.scene),
         size=cell.size,
@@ -67,6 +67,8 @@ def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) ->
         measure=cell.measure,
         made=[made.airlight, made.source, made.packages, made.variant],
     )
+    assert key is not None, "the identity of a scene is a word"
+    return key
 
 
 def scene_identities(scenes: Iterable[str]) -> dict[str, str]:

@@ -87,7 +87,7 @@ class SceneStudy:
         """The identity of the scene, by its name."""
         if self.loaded.path is None:
             return scene_identity(self.name)
-        return f"{self.name} {scene_digest(self.loaded.scene)}"
+        return f"{self.name} {scene_digest(self.loaded.scene) or time.time_ns()}"
 
     @cached_property
     def configurations(self) -> tuple[Configuration, ...]:
@@ -144,9 +144,18 @@ class SceneStudy:
             parts[chosen.label] = 0.0 if kept else _seconds(configuration_work(self.scene, chosen))
         return parts
 
-    def given(self, chosen: Configuration) -> tuple[Cell, list[str], Mapping[str, str]]:
+    @property
+    def reference_key(self) -> str | None:
+        """The key of the reference, which is part of the keys of all that is compared with it."""
+        return reference_image.key(self.loaded.scene, points=self.study.points)
+
+    def given(self, chosen: Configuration) -> tuple[Cell, str | None, list[str], Mapping[str, str]]:
         """Return the inputs that decide the row and the image of a configuration."""
-        return replace(self.cell(chosen), scene=self.identity), user_code(chosen), self.machine
+        return replace(self.cell(chosen), scene=self.identity), self.reference_key, user_code(chosen), self.machine
+
+    def given_image(self, shown: "EngineImage", digest: str, times: Any) -> tuple[Any, ...]:
+        """Return the inputs that decide the row of an image, from the digest of its file and its times."""
+        return self.identity, self.reference_key, self.size, shown.label, shown.path.name, digest, times
 
 
 def _seconds(work: Work) -> float:
@@ -266,7 +275,13 @@ def multiple_scattering(scene, batches: int, samples: int) -> MultipleScattering
 # A fault of the user's method may have gone by the next run.
 @kept("cell", worth=lambda found: found.row.kind == "built-in" or found.row.status == "done")
 def measured(
-    cell: Cell, code: list[str], machine: Mapping[str, str], *, study: SceneStudy, apart: Apart | None
+    cell: Cell,
+    reference_key: str | None,
+    code: list[str],
+    machine: Mapping[str, str],
+    *,
+    study: SceneStudy,
+    apart: Apart | None,
 ) -> Judged:
     """Return the row and the image of a cell, whose scene is an identity; `code` is that of the user in it."""
     asked, kept = replace(cell, scene=study.path), study.kept_reference
@@ -313,16 +328,24 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     from validation.engine.images import image_times
 
     digest = hashlib.sha256(shown.path.read_bytes()).hexdigest()
-    result = measured_image.result(
-        study.identity, study.size, shown.label, digest, image_times(shown.path), study=study, shown=shown
-    )
+    given = study.given_image(shown, digest, image_times(shown.path))
+    result = measured_image.result(*given, study=study, shown=shown)
     whole = None if study.study.flip == "none" else result.value.whole
     return replace(result.value, whole=whole, results=(result,))
 
 
 @kept("scene-image")
 def measured_image(
-    scene: str, size: tuple[int, int], label: str, digest: str, times: Any, *, study: SceneStudy, shown: "EngineImage"
+    scene: str,
+    reference_key: str | None,
+    size: tuple[int, int],
+    label: str,
+    file: str,
+    digest: str,
+    times: Any,
+    *,
+    study: SceneStudy,
+    shown: "EngineImage",
 ) -> Judged:
     """Return the row of an image with its layers, from the identity of its scene and the digest of its file."""
     from validation.engine.images import measure_image, notes_of
@@ -352,7 +375,7 @@ def measured_image(
         whole = judged.reference
     elif "surface" in layers or not np.any(reference.surface > 0):
         whole = reference.airlight + reference.surface
-    image = Image(layers, attributes={"airlight:scene": study.name, "airlight:image": shown.path.name})
+    image = Image(layers, attributes={"airlight:scene": study.name, "airlight:image": file})
     return Judged(record_of(row, Row), image, judged.reference, whole)
 
 

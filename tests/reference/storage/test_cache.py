@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import reference.storage.cache as module
 from analytic.errors import InputError
 from reference.storage.cache import (
     DEFAULT_LIMIT,
@@ -161,8 +160,6 @@ def test_the_folder_is_where_the_environment_says_and_made_when_needed(monkeypat
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "file"))
     assert load_arrays("x") is None
-    with pytest.raises(InputError, match="is not a folder"):
-        store_arrays("x", {"a": 1})
     monkeypatch.delenv("AIRLIGHT_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     assert cache_folder() == tmp_path / "xdg" / "airlight"
@@ -206,13 +203,30 @@ def test_the_files_that_were_used_longest_ago_are_removed_first(own_cache):
 
 def test_storing_keeps_to_the_limit(own_cache, monkeypatch):
     monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", "25kB")
-    monkeypatch.setattr(module, "_written", 0)
     for number in range(5):
         store_arrays(key("page", number), {"a": np.zeros(10_000, dtype=np.uint8)})
     assert [is_stored(key("page", number)) for number in range(5)] == [False, False, False, True, True]
-    monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", "0")
+
+
+@pytest.mark.parametrize("size", ["0", "0MB"])
+def test_a_cache_of_size_0_is_neither_read_nor_written(own_cache, monkeypatch, size):
+    names = fill(own_cache)
+    monkeypatch.setenv("AIRLIGHT_CACHE_SIZE", size)
+    assert (load_arrays(names[0]), load_arrays(names[0], ["a"]), is_stored(names[0])) == (None, None, False)
     store_arrays(key("page", 9), KB)
-    assert cache_entries() == []
+    monkeypatch.delenv("AIRLIGHT_CACHE_SIZE")
+    assert not is_stored(key("page", 9))
+    assert load_arrays(names[0]) is not None
+
+
+def test_a_folder_that_cannot_be_written_is_noted_once_by_its_name_and_ends_nothing(monkeypatch, tmp_path, caplog):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "file"))
+    for number in range(2):
+        store_arrays(key("page", number), KB)
+    (record,) = caplog.records
+    assert f"the cache folder {tmp_path / 'file'} cannot be written" in record.getMessage()
+    assert load_arrays(key("page", 0)) is None
 
 
 def test_clearing_leaves_what_is_not_of_the_cache(own_cache):

@@ -11,14 +11,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from analytic.clock import Spent
 from reference.monte_carlo.volpath import volpath_batch
-from reference.quadrature.image import quadrature_image
 from reference.storage import kept as module
+from reference.storage.cache import cache_folder
 from reference.storage.kept import (
     add_spent,
     code_digest,
@@ -32,6 +33,8 @@ from reference.storage.kept import (
     store,
 )
 from reports.machine.driver_check import error_of_device
+from tests.helpers.scenes import tiny_scene
+from validation.estimates.quadrature import reference_image
 from validation.kernels.rays import _reference
 from validation.study.run import run
 from validation.study.scene import check_reference
@@ -135,7 +138,9 @@ class Settings:
     name: str = "x"
 
 
-def test_a_key_has_every_argument_in_it():
+def test_a_key_has_every_argument_in_it(tmp_path):
+    (tmp_path / "x").write_text("1")
+    (tmp_path / "y").write_text("1")
     keys = [
         key_of("page", kept, **arguments)
         for arguments in (
@@ -150,12 +155,32 @@ def test_a_key_has_every_argument_in_it():
             {"a": np.zeros((3, 1))},
             {"a": np.zeros(3, np.float32)},
             {"a": {"x": (1, 2.5)}},
-            {"a": Path("x")},
+            {"a": tmp_path / "x"},
+            {"a": tmp_path / "y"},
         )
     ]
     assert len(set(keys)) == len(keys)
     assert key_of("page", kept, a=1) != key_of("row", kept, a=1) != key_of("row", a=1)
-    assert key_of("page", kept, a=1, b=(2,)) == key_of("page", kept, b=[2], a=1)
+    assert key_of("page", kept, a=1, b=(2,)) == key_of("page", kept, b=(2,), a=1)
+    before = key_of("page", kept, a=tmp_path / "x")
+    (tmp_path / "x").write_text("2")
+    assert key_of("page", kept, a=tmp_path / "x") != before  # the content of a file, not its name alone
+
+
+@pytest.mark.parametrize("value", [{"a"}, frozenset("a"), object(), print, b"a", {1: "a"}, np.array([object()]), int])
+def test_what_has_no_content_for_a_key_is_refused_and_not_spelt(value):
+    with pytest.raises(TypeError, match="cannot be part of a key"):
+        key_of("page", kept, a=(1, {"b": value}))
+
+
+def test_a_value_of_a_scene_that_has_no_digest_is_computed_and_not_kept(variant):
+    texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.ones((2, 2, 3), np.float32))}
+    scene = mi.load_dict(tiny_scene(ball={"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": texture}}))
+    calls: list[str] = []
+    results = [page.result(scene, calls=calls) for _ in range(2)]
+    assert (page.key(scene), page.is_kept(scene), len(calls)) == (None, False, 2)
+    assert not any(result.loaded for result in results)
+    assert not list(cache_folder().glob("*"))
 
 
 # --- source code -----------------------------------------------------------------------------------------------------
@@ -222,9 +247,30 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
     assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest(key_of)]
 
 
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("validation.papers.shadow_planes", "validation/scenes/fog.toml"),
+        ("validation.papers.shadow_planes", "validation/papers/claims.toml"),
+        ("validation.study.growth", "validation/study/studies/methods.toml"),
+        ("validation.kernels.stability", "validation/certified/airlight_integral.csv"),
+        ("validation.study.run", "realtime/numerics/blue_noise.npy"),
+    ],
+)
+def test_the_data_that_code_reads_count_with_it(monkeypatch, name, file):
+    """Figures of papers stood as they were when the fog of a scene was changed."""
+    path, source = module._ROOT / file, module._source
+    before = source_digest(name)
+    monkeypatch.setattr(module, "_source", lambda each: source(each) + b"#" * (each == path))
+    module._digest_of.cache_clear()
+    after = source_digest(name)
+    module._digest_of.cache_clear()
+    assert after != before
+
+
 #: Cached functions by kind, and a module on whose numbers each depends.
 COMPUTED = {
-    "quadrature": (quadrature_image, "reference.quadrature.segments"),
+    "quadrature": (reference_image, "reference.quadrature.segments"),
     "volpath": (volpath_batch, "reference.scene.read"),
     "kernel-rays": (_reference, "analytic.panels"),
     "row": (run, "realtime.methods.ray_march"),

@@ -7,9 +7,12 @@ import sys
 from pathlib import Path
 
 import mitsuba as mi
+import numpy as np
+import pytest
 
-from reference.storage.scene_digest import scene_digest
+from reference.storage.scene_digest import build_scene, is_whole, scene_digest
 from tests.helpers.scenes import spot, tiny_scene
+from validation.scenes.loading import load_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -52,6 +55,77 @@ def test_every_change_of_a_scene_changes_its_digest(variant):
     digests = {name: scene_digest(make()) for name, make in CHANGES.items()}
     assert len(set(digests.values())) == len(CHANGES)
     assert digests["nothing"] == scene_digest(load())
+
+
+PIXELS = np.linspace(0.1, 0.9, 12, dtype=np.float32).reshape(2, 2, 3)
+
+
+def textured(**properties):
+    texture = {"type": "bitmap", "bitmap": mi.Bitmap(PIXELS), "raw": True} | properties
+    return {"ball": tiny_scene()["ball"] | {"bsdf": {"type": "diffuse", "reflectance": texture}}}
+
+
+def smoky(**properties):
+    grid = {"type": "gridvolume", "grid": mi.VolumeGrid(np.linspace(0, 1, 24, dtype=np.float32).reshape(2, 3, 4))}
+    phase = {"type": "hg", "g": 0.3}
+    return {"fog": {"type": "heterogeneous", "id": "fog", "sigma_t": grid | properties, "albedo": 0.9, "phase": phase}}
+
+
+HIDDEN = [
+    {},
+    {"filter_type": "nearest"},
+    {"wrap_mode": "clamp"},
+    {"wrap_mode": "mirror"},
+]
+
+
+@pytest.mark.parametrize("parts", [textured, smoky])
+def test_filters_and_borders_count_though_no_built_object_tells_them(variant, parts):
+    """Images of two scenes that differ by them alone were taken for each other."""
+    scenes = [build_scene(tiny_scene(size=(5, 4), **parts(**properties))) for properties in HIDDEN]
+    assert len({scene_digest(scene) for scene in scenes}) == len(HIDDEN)
+    assert scene_digest(build_scene(tiny_scene(size=(5, 4), **parts()))) == scene_digest(scenes[0])
+    changed = mi.traverse(scenes[0])
+    changed["lamp.position"] = [0.0, 0.0, 1.0]
+    changed.update()
+    assert scene_digest(scenes[0]) not in {scene_digest(scene) for scene in scenes[1:]}
+
+
+@pytest.mark.parametrize("parts", [textured, smoky])
+def test_a_scene_that_nobody_can_tell_from_another_has_no_digest(variant, parts):
+    scene = load(**parts())
+    assert not is_whole(scene)
+    assert scene_digest(scene) is None
+
+
+def test_a_dictionary_with_an_object_that_was_built_before_has_a_digest_if_mitsuba_tells_all_of_it(variant):
+    built = [mi.load_dict(part["ball"]) for part in (textured(), textured(filter_type="nearest"))]
+    assert [scene_digest(build_scene(tiny_scene(size=(5, 4), ball=ball))) for ball in built] == [None, None]
+    plain = [mi.load_dict(tiny_scene()["ball"] | {"radius": radius}) for radius in (0.4, 0.5)]
+    digests = [scene_digest(build_scene(tiny_scene(size=(5, 4), ball=ball, **smoky()))) for ball in plain]
+    assert None not in digests
+    assert digests[0] != digests[1]
+
+
+FILE = """<scene version="3.0.0">
+    <medium type="homogeneous" id="fog"><float name="sigma_t" value="0.31"/></medium>
+    <emitter type="point"><rgb name="intensity" value="5, 4, 3"/></emitter>
+    <sensor type="perspective"><ref name="medium" id="fog"/></sensor>
+    <shape type="sphere"><bsdf type="diffuse">
+        <texture type="bitmap" name="reflectance"><string name="filename" value="a.exr"/>{}</texture></bsdf></shape>
+</scene>"""
+
+
+def test_a_scene_file_counts_with_its_words_and_with_the_files_that_it_names(variant, tmp_path):
+    def digest(words="", pixels=PIXELS):
+        mi.Bitmap(pixels).write(str(tmp_path / "a.exr"))
+        (tmp_path / "scene.xml").write_text(FILE.format(words))
+        return scene_digest(load_scene(str(tmp_path / "scene.xml"), (5, 4)).scene)
+
+    nearest = '<string name="filter_type" value="nearest"/>'
+    assert None not in (digests := [digest(), digest(nearest), digest(pixels=PIXELS[::-1].copy())])
+    assert len(set(digests)) == 3
+    assert digest() == digests[0]
 
 
 UNNAMED = """<scene version="3.0.0">

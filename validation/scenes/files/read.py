@@ -11,6 +11,7 @@ import mitsuba as mi
 
 from analytic.errors import InputError
 from reference.storage.files import temporary_folder
+from reference.storage.scene_digest import description_digest, give_description
 from validation.scenes.changes import give_lobes
 from validation.scenes.files.media import give_extinction, grey_densities, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
@@ -74,6 +75,7 @@ def _built(config: Any, state: Any, lobes: Mapping[str, float]) -> Any:
         return mi.parser.instantiate(config, state)
     _mend(state)
     give_lobes(state, lobes)
+    digest = description_digest(state)
     with temporary_folder() as folder:
         notes = cylinders_as_meshes(state, folder)
         scene = mi.parser.instantiate(config, mi.parser.ParserState(state))  # which takes the nodes apart
@@ -82,6 +84,7 @@ def _built(config: Any, state: Any, lobes: Mapping[str, float]) -> Any:
         scene = mi.parser.instantiate(config, state) if any(changed) else scene
     for note in [*notes, *rooms, *touching(scene)]:
         mi.Log(mi.LogLevel.Warn, note)
+    give_description(scene, digest)
     return scene
 
 
