@@ -45,6 +45,18 @@ _INTEGERS = "colours in unsigned integers"
 _COLOURS = {"r": "R", "g": "G", "b": "B", "red": "R", "green": "G", "blue": "B"}  # as other programs name channels
 _WHOLE = frozenset((*_COLOURS, "y"))
 _MAGIC = 20000630
+_ENCODED = "its values are encoded for a screen: save linear radiance as EXR"
+_CONVERTED = "convert it, for example by oiiotool FILE -o FILE.exr"
+#: How files of other kinds begin, what they are, and what to do.
+_OTHERS = (
+    (b"\x89PNG", " but PNG", _ENCODED),
+    (b"\xff\xd8\xff", " but JPEG", _ENCODED),
+    (b"#?", " but Radiance HDR", _CONVERTED),
+    (b"PF", " but PFM", _CONVERTED),
+    (b"II*\x00", " but TIFF", _CONVERTED),
+    (b"\x93NUMPY", " but an array of NumPy", "from Python give the array: airlight.compare(SCENE, numpy.load(FILE))"),
+    (b"", "", "expected linear radiance as EXR: save it again"),
+)
 _DEEP = 0x800  # the bit of the second word of a file
 _PLAIN = frozenset(("", "rgb", "rgba"))  # names of a part whose channels are the image itself
 
@@ -102,7 +114,8 @@ def layer_names(image: Image) -> str:
         return ", ".join(sorted(image.layers))
     note = str(image.attributes.get(NOTE, ""))
     why = f" ({note})" if note else ""
-    return f"no layer of colours at all{why}" + ("; write it in half or float" if _INTEGERS in note else "")
+    way = "it in half or float" if _INTEGERS in note else "channels R, G, B"
+    return f"no layer of colours at all{why}; write {way}"
 
 
 def write_exr(path: str | os.PathLike[str], image: Image, *, finite: bool = True) -> None:
@@ -318,7 +331,8 @@ def _check_kind(path: str | os.PathLike[str]) -> None:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot read {path}: {reason}; give an EXR file that exists") from error
     if len(start) < 8 or struct.unpack("<I", start[:4])[0] != _MAGIC:
-        raise InputError(f"{Path(path)} is not an EXR file; give an image with the layers of an EXR")
+        what, way = next((what, way) for first, what, way in _OTHERS if start.startswith(first))
+        raise InputError(f"{Path(path)} is not an EXR file{what}; {way}")
     flags = struct.unpack("<I", start[4:])[0]
     if flags & _DEEP:
         raise InputError(f"{path} is a deep EXR file; save it flat")

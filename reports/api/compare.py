@@ -116,7 +116,7 @@ def compare(
     if holds not in (None, "airlight", "surface", "total"):
         raise InputError(f"layer: got {holds!r} as the content of {layer}, expected airlight, surface or total")
     scene = reference if _is_scene(reference) else None
-    if scene is None and _is_scene(test) and not Path(str(test)).is_file():
+    if scene is None and _is_scene(test) and (_is_xml(test) or not Path(str(test)).is_file()):
         raise InputError(f"compare: the scene stands first: airlight compare {test!s} {reference!s}")
     about: dict[str, Any] = {"output": several(output), "margin": margin, "all_metrics": all_metrics}
     if scene is None:
@@ -175,7 +175,11 @@ def _is_scene(word: Any) -> bool:
         return False
     path, name = Path(word), str(word)
     known = name in scene_names() or name.startswith("random:")
-    return known or path.suffix.lower() == ".xml" or not (path.suffix or path.exists())
+    return known or _is_xml(word) or not (path.suffix or path.exists())
+
+
+def _is_xml(word: Any) -> bool:
+    return Path(str(word)).suffix.lower() == ".xml"
 
 
 @contextmanager

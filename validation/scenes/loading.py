@@ -6,13 +6,11 @@ import os
 import re
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
-from xml.parsers import expat
 
 import mitsuba as mi
 
@@ -28,7 +26,6 @@ from validation.scenes.random.design import PREFIX, is_random, random_parts, rea
 from validation.scenes.registry import SCENES, Animation, SceneRecord
 
 _LARGEST = 16384
-_DEEPEST = 200  # elements in one another; a scene has about ten
 
 
 @dataclass(frozen=True)
@@ -169,7 +166,6 @@ def _check_films(loaded: LoadedScene) -> None:
 def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
     from validation.scenes.files.read import read_file
 
-    _check_depth(path)
     scene = read_file(path, lobes)
     if not isinstance(scene, mi.Scene):
         raise InputError(f"scene {path}: the file holds a single {type(scene).__name__}; expected a whole <scene>")
@@ -186,27 +182,6 @@ def name_shapes(scene) -> None:
         if not shape.id():
             name = f"{shape.class_name().lower()}-{number}"
             shape.set_id(name if name not in taken else f"{name}-{len(taken)}")
-
-
-def _check_depth(path: Path) -> None:
-    """Refuse a file that Mitsuba's reader, which calls itself for every element, would end the process at."""
-    depth = deepest = 0
-
-    def opens(name: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, deepest
-        depth += 1
-        deepest = max(deepest, depth)
-
-    def closes(name: str) -> None:
-        nonlocal depth
-        depth -= 1
-
-    parser = expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = opens, closes
-    with suppress(expat.ExpatError), path.open("rb") as file:  # what is malformed Mitsuba says best
-        parser.ParseFile(file)
-    if deepest > _DEEPEST:
-        raise InputError(f"scene {path}: its elements are nested {deepest} deep; expected at most {_DEEPEST}")
 
 
 def resize(scene, size: tuple[int, int]) -> None:

@@ -23,7 +23,7 @@ _NOT_NEGATIVE = (*_LIGHT, "sigma_t", "albedo", "scale")
 _PLACES = ("z_1", "z_2", "floor", "cap", "up")  # of height fog
 _CUTOFF = "cutoff_angle"  # of spots, half of the cone [degrees]
 _LARGEST_ALBEDO = 1 + 1e-6  # rounding
-_CLIP = ("near_clip", "far_clip")  # no method takes them
+_CLIP = ("near_clip", "far_clip")  # no method takes them, see `validation.scenes.files.camera`
 _NO_MATTER = ("vertex_texcoords",)
 _LEAST_SCALE = 1e-15  # of an axis of a transform [m]
 _FLATTEST = 1e-9  # of one axis beside another
@@ -93,10 +93,13 @@ def _check(name: str, key: str, values: Array) -> None:
     least = 0.0 if any(word in _NOT_NEGATIVE for word in words) and words[-1] not in _PLACES else -largest
     wrong = ~((values >= least) & (values <= largest))
     if wrong.any():
+        way = "a medium scatters no more than arrives" if "albedo" in words else "use other units, or the right sign"
         given = f"{values[wrong].ravel()[0]:g}"
         given += f" in {int(wrong.sum())} of {values.size} places" if values.size > 1 else ""
         wanted = f"finite numbers {'from 0 to' if least == 0 else 'of at most'} {largest:.3g}"
-        raise InputError(f"{name}: {key} has {given}; expected {wanted}: use other units, or the right sign")
+        raise InputError(
+            f"{name}: {key.removesuffix('.value').removesuffix('.value')} has {given}; expected {wanted}: {way}"
+        )
     if words[-1] == "to_world":
         _check_transform(name, key, values.reshape(4, 4))
 

@@ -44,6 +44,12 @@ MISTAKES = (
     ("reference open-fog --seed 3", "quadrature: draws no samples; leave out seed"),
     ("reference open-fog -o a.png", "expected a name that ends in .exr"),
     ("compare image.exr", "TEST"),
+    ("compare image.exr empty.xml", "the scene stands first: airlight compare empty.xml image.exr"),
+    ("describe empty.xml", "empty.xml: the file is empty"),
+    ("reference image.exr", "the file is an EXR image"),
+    ("render engine", "engine is a folder"),
+    ("report --quick missing.xml", "there is no file missing.xml"),
+    ("compare open-fog rays.csv", "rays.csv is not an EXR file"),
     ("compare image.exr open-fog", "the scene stands first: airlight compare open-fog"),
     ("compare opn-fog image.exr", "did you mean 'open-fog'"),
     ("compare image.exr image.exr --pixel area", "two images have no scene; leave out pixel"),
@@ -95,6 +101,7 @@ def test_a_mistake_is_one_line_that_names_the_culprit(variant, tmp_path, monkeyp
     ones = np.ones((6, 8, 3))
     image = Image({"airlight": ones, "airlight_se": 0.1 * ones}, attributes={"airlight:batches": 32})
     write_exr(tmp_path / "image.exr", image)
+    (tmp_path / "empty.xml").touch()
     (tmp_path / "engine").mkdir()
     write_exr(tmp_path / "engine" / "opn-fog.exr", image)
     before = sorted(tmp_path.rglob("*"))

@@ -32,7 +32,7 @@ def refused(text):
     ("text", "said"),
     [
         ('<scene version="3.0.0"><shape type="sphere"></scene>', "line 1"),
-        ("", "No document element"),
+        ("", "the file is empty"),
         ('<scene version="3.0.0"><shape type="spher"/></scene>', '"spher" not found'),
         (
             '<scene version="3.0.0"><shape type="ply"><string name="filename" value="gone.ply"/></shape></scene>',

@@ -7,9 +7,12 @@ take are refused in Mitsuba's own words. Changes are reported in notes, as warni
 
 Read in this order:
 
+- `text.py`: what is no scene, before Mitsuba reads it;
 - `nodes.py`: the nodes of a parsed file;
 - `media.py`: extinction and albedo from what old files have;
 - `shapes.py`: instances written out, lamps on quads as rectangles, rooms of fog as boxes;
+- `camera.py`: what no camera may be, and what its clip planes cut from Mitsuba's images;
 - `references.py`: media that opaque shapes reference;
+- `advice.py`: files and colours that are refused by name, and what to do about Mitsuba's refusals;
 - `read.py`: a file made into a scene; what no command takes is refused by name.
 """

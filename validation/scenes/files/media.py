@@ -33,20 +33,26 @@ def give_extinction(state: Any) -> list[str]:
             del props["strategy"]
         given = [key for key in _OLD if key in props]
         if not given:
+            if "sigma_t" in props and props.type("sigma_t") == mi.Properties.Type.Color:
+                _set_extinction(props, np.array(props["sigma_t"], dtype=np.float64))
             continue
         sigma_t, albedo = _extinction(props)
         for key in given:
             del props[key]
-        # Mitsuba takes colours of a medium for reflectances, from 0 to 1: what is above goes into the scale.
-        above = max(1.0, float(sigma_t.max()))
-        props["scale"] = float(props.get("scale", 1.0)) * above
-        for key, values in (("sigma_t", sigma_t / above), ("albedo", albedo)):
-            props[key] = mi.ScalarColor3d(*(float(value) for value in values))
+        _set_extinction(props, sigma_t)
+        props["albedo"] = mi.ScalarColor3d(*albedo.tolist())
         notes.append(
             f"medium '{props.id()}': {' and '.join(given)} are read as sigma_t {_words(sigma_t)} and albedo "
             f"{_words(albedo)}"
         )
     return notes
+
+
+def _set_extinction(props: Any, sigma_t: Array) -> None:
+    """Set an extinction, (3,): Mitsuba takes it for a reflectance, from 0 to 1; what is above goes into the scale."""
+    above = max(1.0, float(sigma_t.max()))
+    props["scale"] = float(props.get("scale", 1.0)) * above
+    props["sigma_t"] = mi.ScalarColor3d(*(sigma_t / above).tolist())
 
 
 def _make_homogeneous(state: Any, props: Any) -> None:

@@ -35,8 +35,13 @@ def child(state: Any, index: int, wanted: str) -> int | None:
 
 def used(state: Any) -> list[int]:
     """Return the numbers of the nodes that the scene holds, each after the first that refers to it."""
-    found: dict[int, None] = {0: None}
-    waiting = [0]
+    return reached(state, 0)
+
+
+def reached(state: Any, index: int) -> list[int]:
+    """Return the numbers of a node and of the nodes below it, each after the first that refers to it."""
+    found: dict[int, None] = {index: None}
+    waiting = [index]
     while waiting:
         for _, at in references(properties(state, waiting.pop(0))):
             if at not in found:

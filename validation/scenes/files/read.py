@@ -13,10 +13,13 @@ from analytic.errors import InputError
 from reference.storage.files import temporary_folder
 from reference.storage.scene_digest import description_digest, give_description
 from validation.scenes.changes import give_lobes
+from validation.scenes.files.advice import check_colours, check_files, in_words
+from validation.scenes.files.camera import check_camera, clip_notes
 from validation.scenes.files.media import give_extinction, grey_densities, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
 from validation.scenes.files.references import leave_out_media, touching
 from validation.scenes.files.shapes import cylinders_as_meshes, lamps_as_rectangles, rooms_as_boxes, write_out_instances
+from validation.scenes.files.text import check_text
 
 _TAKEN = {
     "Emitter": ("point", "spot", "directional", "area", "constant", "envmap"),
@@ -36,18 +39,15 @@ def read_file(path: Path, lobes: Mapping[str, float] = MappingProxyType({})) -> 
     """
     config = mi.parser.ParserConfig(mi.variant())
     resolver = mi.file_resolver()
+    check_text(path)
     try:
         mi.set_file_resolver(mi.FileResolver(resolver))
         mi.file_resolver().prepend(str(path.parent))
-        return _built(config, _parsed(config, path), lobes)
+        return _built(config, _parsed(config, path), path, lobes)
     except InputError:
         raise
     except Exception as error:  # Mitsuba raises RuntimeError for all bad input; Python plugins raise anything
-        reason = re.sub(r"^\[[^\]]*\]\s*", "", " ".join(str(error).split()))
-        reason = re.sub(r".*Traceback .*?\w*Error: ", "", reason)  # what a plugin in Python said
-        if "invalid lookat" in reason:
-            reason += ': it looks along its own up; write another up, for example up="0, 1, 0"'
-        raise InputError(f"scene {path}: Mitsuba cannot read it: {reason}") from error
+        raise InputError(f"scene {path}: Mitsuba cannot read it: {in_words(error)}") from error
     finally:
         mi.set_file_resolver(resolver)
 
@@ -70,10 +70,10 @@ def _parsed(config: Any, path: Path) -> Any:
     return state
 
 
-def _built(config: Any, state: Any, lobes: Mapping[str, float]) -> Any:
+def _built(config: Any, state: Any, path: Path, lobes: Mapping[str, float]) -> Any:
     if kind(state, 0) != "Scene":
         return mi.parser.instantiate(config, state)
-    _mend(state)
+    _mend(state, path)
     give_lobes(state, lobes)
     digest = description_digest(state)
     with temporary_folder() as folder:
@@ -82,21 +82,23 @@ def _built(config: Any, state: Any, lobes: Mapping[str, float]) -> Any:
         rooms = rooms_as_boxes(state, scene.shapes())
         changed = [bool(rooms), lamps_as_rectangles(state, scene.shapes()), leave_out_media(state, scene)]
         scene = mi.parser.instantiate(config, state) if any(changed) else scene
-    for note in [*notes, *rooms, *touching(scene)]:
+    for note in [*notes, *rooms, *touching(scene), *clip_notes(scene)]:
         mi.Log(mi.LogLevel.Warn, note)
     give_description(scene, digest)
     return scene
 
 
-def _mend(state: Any) -> None:
+def _mend(state: Any, path: Path) -> None:
     """Change what a file says into what both readers take, and say so."""
     _leave_out_rendering(state)
     name_nodes(state)
     check_kinds(state)
+    check_files(state, path)
     for note in give_extinction(state):
         mi.Log(mi.LogLevel.Warn, note)
     grey_densities(state)
     pass_where_no_material(state)
+    check_colours(state)
     write_out_instances(state)
 
 
@@ -130,19 +132,7 @@ def check_kinds(state: Any) -> None:
         _check_light(state, index)
     sensors = of_kind(state, "Sensor")
     if sensors:
-        _check_camera(properties(state, sensors[0]))
-
-
-def _check_camera(props: Any) -> None:
-    name = f"camera '{props.id()}'"
-    if props.plugin_name() != "perspective":
-        raise InputError(
-            f"{name} is of type '{props.plugin_name()}'; expected a sensor of type 'perspective', a pinhole: replace it"
-        )
-    for axis in "xy":
-        key = f"principal_point_offset_{axis}"
-        if key in props and float(props[key]):
-            raise InputError(f"{name} has {key} = {float(props[key]):g}; expected none: remove it")
+        check_camera(properties(state, sensors[0]))
 
 
 def _check_light(state: Any, index: int) -> None:
