@@ -303,9 +303,15 @@ def light_of_orders(
     `OrdersLight.collectors` of the last frame; None where a search starts with nothing.
     """
     cold = cold_start(light_map, point)
-    lights = []
-    for number in range(sets):
-        start = cold if last is None else _warm(cold, last[number], point)
+    Float, Vector = type(cold.width), type(cold.centre)
+    # By set the collector, which is at first that of the last frame, and the light that comes from it.
+    centres, widths = (dr.alloc_local(kind, sets, value=kind(0)) for kind in (Vector, Float))
+    radiances = dr.alloc_local(Float, sets, value=Float(0))
+    for number, collector in enumerate(last or ()):
+        centres[mi.UInt32(number)], widths[mi.UInt32(number)] = collector.centre, collector.width
+
+    def search_set(number, centres, widths, radiances):
+        start = cold if last is None else _warm(cold, Collector(centres[number], widths[number]), point)
         light = collector_light(
             light_map,
             transport,
@@ -318,9 +324,22 @@ def light_of_orders(
             search=search,
             active=active,
         )
-        lights.append(light)
-    kept = (Collector(light.collector.centre - point, dr.select(active, light.collector.width, 0)) for light in lights)
-    return OrdersLight(tuple(light.radiance for light in lights), tuple(kept))
+        centres[number] = light.collector.centre - point
+        widths[number] = dr.select(active, light.collector.width, 0)
+        radiances[number] = light.radiance
+        return number + 1, centres, widths, radiances
+
+    # One loop over the sets: a search for each would make the kernel eight times as long.
+    lanes = max(dr.width(point), dr.width(toward))
+    _, centres, widths, radiances = dr.while_loop(
+        state=(dr.zeros(mi.UInt32, lanes), centres, widths, radiances),
+        cond=lambda number, *found: number < sets,
+        body=search_set,
+        labels=("number", "centres", "widths", "radiances"),
+    )
+    numbers = [mi.UInt32(number) for number in range(sets)]
+    collectors = tuple(Collector(centres[number], widths[number]) for number in numbers)
+    return OrdersLight(tuple(radiances[number] for number in numbers), collectors)
 
 
 def _warm(cold: Collector, last: Collector, point) -> Collector:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -299,30 +300,32 @@ def fit_on_device(fitted: tuple[FittedSet, ...], types: ArrayTypes) -> "DeviceFi
     """
     Float = types.scalar
 
-    def arrays(number: int) -> dict[str, Any]:
-        each = fitted[number]
-        by_name = {"p": each.p, "of_directions": each.of_directions, "of_suns": each.of_suns}
-        by_name |= {"collector": each.collector, "n": each.n}
-        return {name: Float(np.clip(values, -_LARGEST, _LARGEST).ravel()) for name, values in by_name.items()}
+    def table(name: str) -> Any:
+        of_all = np.stack([getattr(each, name) for each in fitted])
+        return Float(np.clip(of_all, -_LARGEST, _LARGEST).ravel())
 
-    made = DeviceFit(
-        tuple(arrays(number) for number in range(len(fitted))),
-        tuple(tuple(float(np.clip(value, -_LARGEST, _LARGEST)) for value in each.spread) for each in fitted),
-    )
+    made = DeviceFit(*(table(field.name) for field in fields(DeviceFit)))
     dr.make_opaque(made)
     return made
 
 
 @dataclass(frozen=True)
 class DeviceFit:
-    """Fitted functions as a `Transport`; their arrays are fields, so that recorded functions take them as inputs."""
+    """Fitted functions as a `Transport`, each a table of all sets, one after the other.
 
-    tables: tuple[dict[str, Any], ...]
-    spreads: tuple[tuple[float, ...], ...]
+    They are fields, so that recorded functions take them as inputs.
+    """
 
-    def __call__(self, set_number: int, t, d, mu, cos_phi, sin_phi, mu_l):
+    p: Any
+    of_directions: Any
+    of_suns: Any
+    collector: Any
+    n: Any
+    spread: Any
+
+    def __call__(self, set_number: Any, t, d, mu, cos_phi, sin_phi, mu_l):
         """Return T [1/sr], c_x, c_y, sigma [mean free paths]."""
-        table = self.tables[set_number]
+        number = mi.UInt32(set_number)
         t = dr.clip(t, coordinates.THINNEST, coordinates.THICKEST)
         d = dr.clip(d, 0, t)
         sun = dr.clip(mu_l, coordinates.LOWEST_SUN, 1)
@@ -330,18 +333,18 @@ class DeviceFit:
         at_t, _, at_sun = coordinates.place_fractions(t, d, sun)
         at_mu = _direction_fraction(dr.clip(mu, -1, 1))
         cosine = dr.fma(dr.safe_sqrt((1 - mu * mu) * (1 - sun * sun)), cos_phi, -mu * sun)
-        (p,) = between_entries(table["p"], [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1)
+        (p,) = between_entries(self.p, [(dr.safe_acos(cosine) / np.pi, _ANGLES)], 1, number)
         direction, height = (at_mu, _DIRECTIONS), (at_sun, _SUNS)
-        log_a, b1, c, shift = between_entries(table["of_directions"], [(at_t, _THICKNESSES), direction], 4)
-        log_x, b2 = between_entries(table["of_suns"], [(at_t, _THICKNESSES), height], 2)
-        e, f, g, h, i, j, k, ell, m = between_entries(table["collector"], [direction], 9)
-        (n,) = between_entries(table["n"], [direction, height], 1)
+        log_a, b1, c, shift = between_entries(self.of_directions, [(at_t, _THICKNESSES), direction], 4, number)
+        log_x, b2 = between_entries(self.of_suns, [(at_t, _THICKNESSES), height], 2, number)
+        e, f, g, h, i, j, k, ell, m = between_entries(self.collector, [direction], 9, number)
+        (n,) = between_entries(self.n, [direction, height], 1, number)
         b = b1 - b2
         ratio = dr.log(d + shift) / dr.log(dr.maximum(b + shift, _LEAST_SUM))
         T = p * mu_l * ratio * dr.exp(dr.clip(log_a + log_x, -200, 50) - 0.5 * dr.square((d - b) / c))
         depth = dr.log(1 + dr.abs(e) * d)
         c_x = (i + j * (cos_phi * dr.sin(k * phi_l) + ell * phi_l)) * depth + m + n * cos_phi
         c_y = sin_phi * (f * dr.sin(g * phi_l) * depth + h * dr.sin(phi_l))
-        o, q, r, s, big_t = self.spreads[set_number]
+        o, q, r, s, big_t = (dr.gather(type(t), self.spread, 5 * number + place) for place in range(5))
         sigma = o + q * t * dr.log(1 + r * d) + s * dr.log(1 + big_t * t)
         return dr.select(mu_l > 0, T, 0), c_x, c_y, dr.maximum(sigma, 1e-3)
