@@ -185,8 +185,9 @@ def _transform(medium: Any) -> Array:
         raise InputError(f"Mitsuba says nothing of the grid of the {medium.class_name()}; expected a 'gridvolume'")
     matrix = np.array([float(number) for number in re.findall(r"[-+\w.]+", rows[1])]).reshape(4, 4)[:3, :3]
     middle, size = _box(medium, box)
-    if not np.any(matrix - np.diag(np.diagonal(matrix))):
-        matrix = np.diag(np.sign(np.diagonal(matrix)) / size)  # the words have six digits
+    along = np.abs(matrix) > _TURNED * np.abs(matrix).max(axis=1, keepdims=True)
+    if along.sum() == 3:  # Along the axes the sides of the box have all digits, the words have six.
+        matrix = np.where(along, np.sign(matrix) / size, 0.0)
     return np.column_stack([matrix, 0.5 - matrix @ middle])
 
 
