@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: what changes nothing of the light changes nothing of an image, for every method and every built-in scene.
+
+Six relations need no reference, and meet faults that no reference was asked about:
+
+- all intensities times 2 double the image;
+- lengths times 2 with the extinction halved and intensities times 4 change nothing;
+- a speck far behind the camera changes nothing;
+- the world moved and turned with its camera changes nothing;
+- two lights are the sum of each;
+- the bounds of a medium moved where no ray comes change nothing.
+
+Rules say what rounding and a method's discretisation allow:
+
+- *Powers of two* are exact in floating point: twice the light is twice the image to the last bit. Twice
+  the lengths are so to the last bits: grids, bounds and layers know places to a rounding of a metre.
+- *A speck* is behind the camera, and all numbers in view are the same. Under a sun the map of its
+  shadows begins before the speck, and heights in it are rounded.
+- *Moved*, coordinates are rounded: those of 32 m to 2e-6 m. A ray that passes a light at 2 cm has its airlight to 1e-4.
+  Of 192 rays 2 % may graze an edge, and meet the other side of it.
+- *Maps of shadows* have texels along the axes of the world, or about an axis that follows from them. A turn by a right
+  angle at least moves faces onto faces. What is left is as large as the error of the texels, which the difference to
+  a map with four times as many on a side measures; both images have it, and one half more is for chance.
+- *Froxels* end where the light of the farthest lamp fades: lights add up between grids with the same end.
+- *A draw* of one light in many is right in the mean alone: a noisy method is asked nothing of sums.
+- *A map of a light at infinity* spans all media: it is asked nothing of a body far away, which makes its texels wide.
+- *Grids* lie along the axes of the world, and are turned by a right angle; height fog about the vertical.
+"""
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from realtime.errors import InputError
+from realtime.methods.registry import METHODS
+from realtime.parameters import defaults
+from realtime.scene.read_scene import read_scene
+from tests.helpers import metamorphic as changes
+from tests.helpers.area_lights import ring
+from tests.helpers.frames import render
+from tests.helpers.transport_formula import use_formula
+from validation.scenes.height_fog import register_height_fog
+from validation.scenes.meshes import rotation
+from validation.scenes.registry import FILES, SCENES
+
+TABLES = {name: table for path in FILES for name, table in tomllib.loads(path.read_text()).items()}
+#: Parameters with which a frame is cheap: what is tested does not depend on them.
+CHEAP = {"map": 64, "width": 16, "height": 12, "slices": 32}
+POINTS = 4  # light samples of an area light
+LAST_BITS = 2.0**-18  # of the brightest pixel: sums of some tens of float32 numbers
+ROUNDING, GRAZING = 1e-4, 0.02  # see the module: of the brightest pixel, and of all pixels
+CHANCE = 3.0  # errors of texels of both images, one half more
+MOVE = (3.7, -2.9, 1.3)  # [m]
+
+
+@dataclass(frozen=True)
+class Image:
+    """What a scene looks like; None for a scene that the method refuses."""
+
+    airlight: Any
+    surface: Any
+
+
+def parameters(method: str) -> dict[str, Any]:
+    """Return parameters of a method with which a frame is cheap."""
+    return {name: value for name, value in CHEAP.items() if name in defaults(METHODS[method])}
+
+
+def has_maps(method: str) -> bool:
+    """Return whether a method looks up shadows in maps."""
+    made = METHODS[method]()
+    return hasattr(made, "map") and getattr(made, "shadow", "map") == "map"
+
+
+def image(scene: changes.Description, method: str, **more: Any) -> Image | None:
+    """Return the image of a scene; None where the method refuses it."""
+    try:
+        read = read_scene(mi.load_dict(scene, optimize=False))
+        frame = render(read, method, **(parameters(method) | {"points": POINTS} | more))
+    except InputError:
+        return None
+    return Image(frame.airlight.astype(np.float64), frame.surface.astype(np.float64))
+
+
+@lru_cache(maxsize=1)
+def plain(scene: str, method: str) -> Image | None:
+    """Return the image of a scene as it is."""
+    return image(changes.description(scene), method)
+
+
+def beyond(got: Any, expected: Any, within: float = ROUNDING) -> float:
+    """Return the fraction of pixels that differ by more than rounding."""
+    return float(np.mean(np.abs(got - expected).max(axis=2) > within * np.abs(expected).max()))
+
+
+def same(got: Image | None, expected: Image | None, within: float) -> None:
+    """Demand that two images are the same, to a fraction of the brightest pixel; so are two refusals."""
+    assert (got is None) == (expected is None)
+    for part in ("airlight", "surface") if got is not None else ():
+        different = beyond(getattr(got, part), getattr(expected, part), within)
+        assert different <= (GRAZING if within == ROUNDING else 0.0), part
+
+
+def sunlit_maps(scene: str, method: str) -> bool:
+    """Return whether a method looks up the shadows of a sun in a map."""
+    return has_maps(method) and any(light["type"] == "sun" for light in TABLES[scene]["lights"])
+
+
+# Relations ------------------------------------------------------------------------------------------------------------
+
+
+def twice_the_light(scene: str, method: str) -> None:
+    """All intensities times 2 double the image."""
+    before = plain(scene, method)
+    twice = before and Image(2 * before.airlight, 2 * before.surface)
+    same(image(changes.brighter(changes.description(scene), 2.0), method), twice, within=0.0)
+
+
+def twice_the_lengths(scene: str, method: str) -> None:
+    """Lengths times 2 with the extinction halved and intensities times 4 change nothing."""
+    twice = changes.larger(changes.description(scene), 2.0)
+    same(image(twice, method), plain(scene, method), within=LAST_BITS)
+
+
+def a_speck(scene: str, method: str) -> None:
+    """A speck far behind the camera changes nothing."""
+    got = image(changes.with_speck(changes.description(scene)), method)
+    same(got, plain(scene, method), within=ROUNDING if sunlit_maps(scene, method) else LAST_BITS)
+
+
+def moved(scene: str, method: str) -> None:
+    """The world moved and turned with its camera changes nothing beyond rounding and the texels of maps."""
+    fog = TABLES[scene].get("fog", {})
+    turn = np.eye(4)
+    turn[:3, 3] = MOVE
+    squarely = has_maps(method) or "smoke" in fog
+    turn[:3, :3] = rotation((0, 0, 1) if squarely or "layers" in fog else (1, 2, 3), 90.0 if squarely else 37.0)
+    got = image(changes.moved(changes.description(scene), turn), method)
+    before = plain(scene, method)
+    if before is None or got is None or not has_maps(method):
+        same(got, before, within=ROUNDING)
+        return
+    finer = image(changes.description(scene), method, map=4 * CHEAP["map"])
+    assert finer is not None
+    for part in ("airlight", "surface"):
+        one, other, fine = (getattr(each, part) for each in (got, before, finer))
+        texels, difference = (float(np.sqrt(np.mean((other - each) ** 2))) for each in (fine, one))
+        assert difference <= CHANCE * texels or beyond(one, other) <= GRAZING, part
+
+
+def two_lights(scene: str, method: str) -> None:
+    """Two lights, or two halves of many, are the sum of each."""
+    far = {"far": 20.0} if method == "froxel-fog" else {}
+    names = changes.lights(changes.description(scene))
+    if len(names) > 1:
+        halves = names[: len(names) // 2], names[len(names) // 2 :]
+        one, other = (image(changes.only(changes.description(scene), half), method, **far) for half in halves)
+        both = image(changes.description(scene), method, **far)
+    else:
+        more = {"more": changes.another_light(changes.description(scene))}
+        both = image(changes.description(scene) | more, method, **far)
+        one = image(changes.description(scene), method, **far)
+        other = image(changes.only(changes.description(scene) | more, ["more"]), method, **far)
+    if one is None or other is None or both is None:  # a light that the method has not
+        assert both is None
+        return
+    same(both, Image(one.airlight + other.airlight, one.surface + other.surface), within=LAST_BITS)
+
+
+def bounds(scene: str, method: str) -> None:
+    """The bounds of a medium moved where no ray comes change nothing."""
+    near, far = (image(changes.with_body(changes.description(scene), x), method) for x in (320.0, 331.0))
+    same(far, near, within=LAST_BITS)
+
+
+RELATIONS: dict[str, Callable[[str, str], None]] = {
+    each.__name__: each for each in (twice_the_light, twice_the_lengths, a_speck, moved, two_lights, bounds)
+}
+
+
+def holds(relation: str, scene: str, method: str) -> bool:
+    """Return whether a relation is one of a scene and a method; see the rules of the module."""
+    if relation == "two_lights":
+        return not METHODS[method]().noisy
+    if relation == "bounds":
+        return "fog" not in TABLES[scene] and not sunlit_maps(scene, method)
+    return True
+
+
+ALL = [
+    (scene, method, relation)
+    for scene in SCENES
+    for method in METHODS
+    for relation in RELATIONS
+    if holds(relation, scene, method)
+]
+#: Each relation, each kind of scene (no occluder, a spot, bounds under a sun, area lights, many lights,
+#: height fog under lamps and a sun, a grid, clouds) and each method at least once.
+QUICK = {
+    ("open-fog", "unshadowed"): ("a_speck", "two_lights"),
+    ("open-fog", "shadow-planes"): ("a_speck",),
+    ("sphere-spot", "light-volumes"): ("twice_the_lengths", "moved"),
+    ("sphere-spot", "min-max"): ("a_speck", "twice_the_light"),
+    ("sphere-spot", "froxel-fog"): ("two_lights", "a_speck"),
+    ("windows", "shadow-planes"): ("bounds", "moved"),
+    ("penumbra-plane", "ray-march"): ("a_speck", "twice_the_lengths"),
+    ("penumbra-plane", "soft-shafts"): ("two_lights",),
+    ("lanterns", "equi-angular"): ("moved", "twice_the_light"),
+    ("street", "ray-march"): ("twice_the_lengths", "moved"),
+    ("meadow", "unshadowed"): ("moved", "two_lights"),
+    ("smoke", "ray-march"): ("moved",),
+    ("cloud-slab", "cloud-octaves"): ("two_lights", "moved"),
+    ("cloud-slab", "cloud-collectors"): ("twice_the_lengths", "twice_the_light"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _cheap_clouds(variant, monkeypatch):
+    register_height_fog()
+    use_formula(monkeypatch)
+
+
+@pytest.mark.claim("metamorphic")
+@pytest.mark.parametrize(
+    ("scene", "method", "relation"),
+    [pytest.param(*each, marks=() if each[2] in QUICK.get(each[:2], ()) else pytest.mark.slow) for each in ALL],
+)
+def test_what_changes_nothing_changes_nothing(scene, method, relation):
+    RELATIONS[relation](scene, method)
+
+
+@pytest.mark.claim("metamorphic")
+def test_a_speck_changes_nothing_of_a_lamp_that_shadows_itself():
+    """No built-in scene has a lone light in its own way: with any occluder it cast its shadow, and without it none."""
+    scene = changes.description("open-fog")
+    del scene["lamp"]
+    before, after = (
+        image(change(scene | {"ring": ring((0.3, 0.4, 1.1))}), "ray-march") for change in (dict, changes.with_speck)
+    )
+    assert before is not None
+    same(after, before, LAST_BITS)
