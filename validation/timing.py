@@ -21,13 +21,13 @@ class Timing:
     )
 
     @property
-    def interval(self) -> list[float]:
-        """The median with its quartiles [ms]."""
+    def quartiles(self) -> list[float]:
+        """The median with the quartiles [ms]."""
         return [self.median_ms, self.low_ms, self.high_ms]
 
     @property
     def rate(self) -> list[float]:
-        """How often a second, with its quartiles [1/s]."""
+        """How often a second, with the quartiles [1/s]."""
         return [1000 / self.median_ms, 1000 / self.high_ms, 1000 / self.low_ms]
 
 

@@ -16,7 +16,8 @@ _COLUMNS = (
     *words(words="claim", how={"long": True}),
     *words(verdict="verdict"),
     *numbers(published="published", measured="measured"),
-    *numbers(interval="between"),
+    *numbers(ends="between"),
+    *words(interval="which is"),
     *words(unit="unit"),
     *words(why="why", how={"long": True}),
 )
@@ -33,14 +34,14 @@ def paper_tables(rows: Sequence[Claim], *, plain: bool = True) -> list[Table]:
             made.append(table(name, _COLUMNS, map(_cells, several), explanation=f"{count_words(several)}."))
         elif several:
             shown = table(f"{name}: numbers beside ours", _COLUMNS, map(_cells, several))
-            made.append(shown.only("item", "words", "published", "measured", "interval", "unit", "why"))
+            made.append(shown.only("item", "words", "published", "measured", "ends", "interval", "unit", "why"))
     return made
 
 
 def _cells(row: Claim) -> dict[str, Value]:
-    interval = Interval.of((row.low, row.high))
+    ends = Interval.of((row.low, row.high))
     values = {name: getattr(row, name) for name in ("item", "words", "verdict", "published", "measured", "unit", "why")}
-    return values | ({"interval": interval} if interval and interval.low < interval.high else {})
+    return values | ({"ends": ends, "interval": row.interval} if ends and ends.low < ends.high else {})
 
 
 def count_words(rows: Sequence[Claim]) -> str:

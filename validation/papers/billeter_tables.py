@@ -26,6 +26,7 @@ from validation.arrays import Array
 from validation.clock import time_repeated, timed
 from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
+from validation.papers.claims import Figure, quartiles
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import light
 from validation.scenes.registry import SCENES
@@ -52,7 +53,7 @@ IMAGES: Mapping[str, tuple[str, str, Mapping[str, Any]]] = {
 
 
 def billeter_tables(size: tuple[int, int] = SIZE, maps: tuple[int, ...] = MAPS) -> dict[str, Any]:
-    """Return rates, errors and numbers of triangles, at a size of the frames and of the maps of Table 1."""
+    """Return rates and errors, at a size of the frames and of the maps of Table 1."""
     return _images(size) | _table(size, maps)
 
 
@@ -78,8 +79,8 @@ def _image(name: str, renderer: Callable[[], FrameRenderer], true: Array, stride
     return {f"{name} error": error, f"{name} fps": _rate(ready)}
 
 
-def _rate(renderer: FrameRenderer) -> list[float]:
-    return time_repeated(moved_light(renderer), seconds=_SECONDS, least=3).rate
+def _rate(renderer: FrameRenderer) -> Figure:
+    return quartiles(time_repeated(moved_light(renderer), seconds=_SECONDS, least=3).rate)
 
 
 def sampled(image: NDArray[Any], stride: int) -> NDArray[Any]:
@@ -98,7 +99,7 @@ def _table(size: tuple[int, int], maps: tuple[int, ...]) -> dict[str, Any]:
     static, adaptive = (figures[f"colonnade {last} {how} fps"] for how in ("static", "adaptive"))
     gain: Any = next((each for each in (static, adaptive) if isinstance(each, str)), None)
     if gain is None:
-        gain = [adaptive[at] / static[other] for at, other in ((0, 0), (1, 2), (2, 1))]
+        gain = adaptive.over(static)
     return figures | {f"colonnade {last} gain": gain}
 
 
@@ -116,18 +117,16 @@ def table_scene(name: str, size: tuple[int, int]) -> Any:
 
 
 def _view(scene: Scene, view: str, texels: int, tessellation: str) -> dict[str, Any]:
-    """Return the rate of a view of Table 1, and the triangles of the static mesh."""
-    static, rate, triangles = tessellation == "static", f"{view} {tessellation} fps", f"{view} triangles"
+    """Return the rate of a view of Table 1."""
+    rate = f"{view} {tessellation} fps"
     values = {"evaluation": "mesh", "tessellation": tessellation, "map": texels}
 
     def measured() -> dict[str, Any]:
         renderer = prepared(scene, configuration("light-volumes", "exact", values))
         frame_within(renderer)
-        meshes = [mesh for of_group in renderer.prepare(scene) for mesh in of_group] if static else []
-        counted = {triangles: sum(len(mesh.triangles) for mesh in meshes)} if static else {}
-        return {rate: _rate(renderer)} | counted
+        return {rate: _rate(renderer)}
 
-    return attempted((rate, triangles) if static else (rate,), measured)
+    return attempted((rate,), measured)
 
 
 def frame_within(renderer: FrameRenderer) -> Frame:

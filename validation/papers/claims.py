@@ -7,7 +7,8 @@ the paper says that the figure lies. Nobody types a verdict in:
 reproduced      the figure lies where the paper says
 not reproduced  it does not, and the claim is about mathematics or accuracy, which no machine changes
 differs         it does not, and the figure depends on the machine or on a scene of our own
-impossible      the figure cannot be measured here, or its interval holds both answers
+impossible      the figure cannot be measured here, or its interval reaches into both answers: the words say which
+                interval that is, a 95 % interval or the quartiles of repeated times
 
 A row without a direction is a number beside ours and has no verdict: rates of graphics cards of 2004 to 2016 are such.
 """
@@ -17,18 +18,39 @@ import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+from validation.statistics.estimate import Answer
 
 VERDICTS = REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not reproduced", "differs", "impossible"
 EFFORTS = ("quick", "default", "full", "paper")
 DIRECTIONS = ("at most", "at least", "equal", "unequal", "within")
 
-#: Results of an experiment: by name a number, a number with the ends of its interval, or why there is none.
+#: Results of an experiment: by name a number, a `Figure`, or why there is none.
 Figures = Mapping[str, Any]
-#: A measured number with the ends of the interval of its noise.
-Figure = tuple[float, float, float]
+QUARTILES, INTERVAL = "quartiles", "95 % interval"
+
+
+class Figure(NamedTuple):
+    """A measured number with the ends of an interval."""
+
+    value: float
+    low: float
+    high: float
+    interval: str = ""  #: what the ends are: `QUARTILES` of repetitions, `INTERVAL`; empty for a number without chance
+
+    def over(self, other: "Figure") -> "Figure":
+        """Return the quotient of two positive numbers; its ends are the widest that it can have."""
+        names = dict.fromkeys(name for name in (self.interval, other.interval) if name)
+        return Figure(self.value / other.value, self.low / other.high, self.high / other.low, " over ".join(names))
+
+
+def quartiles(values: Sequence[float]) -> Figure:
+    """Return a median with the quartiles, in this order."""
+    median, low, high = values
+    return Figure(median, low, high, QUARTILES)
 
 
 @dataclass(frozen=True)
@@ -51,6 +73,7 @@ class Claim:
     measured: float | None = None  #: the figure, None before and where there is none, with the ends of its interval
     low: float | None = None
     high: float | None = None
+    interval: str = ""  #: what these ends are, as of `Figure`
 
     @property
     def goal(self) -> float:
@@ -67,10 +90,13 @@ class Claim:
         low = -math.inf if self.direction == "at most" else self.goal - away
         return low, math.inf if self.direction == "at least" else self.goal + away
 
-    def holds(self, value: float) -> bool:
-        """Return whether a value lies where the paper says."""
-        low, high = self.bounds
-        return (low <= value <= high) != (self.direction == "unequal")
+    def holds(self, low: float, high: float) -> Answer:
+        """Return whether a number between two ends lies where the paper says; unknown where some of them do."""
+        least, most = self.bounds
+        inside, outside = least <= low and high <= most, high < least or low > most
+        if not (inside or outside):
+            return Answer.UNKNOWN
+        return Answer.YES if inside != (self.direction == "unequal") else Answer.NO
 
     @property
     def rule(self) -> str:
@@ -127,18 +153,19 @@ def taken(claim: Claim, figures: Figures) -> Figure | str:
     for part in parts:
         if isinstance(part, str):
             return part
-    (value, low, high), *others = (part if isinstance(part, Sequence) else (part, part, part) for part in parts)
-    for other, least, most in others:
-        value, low, high = value / other, low / most, high / least
-    return (float(value), float(low), float(high)) if math.isfinite(value) else "the measured figure is not finite"
+    figures_of = [Figure(*part) if isinstance(part, Sequence) else Figure(part, part, part) for part in parts]
+    figure = reduce(Figure.over, figures_of)
+    if not all(map(math.isfinite, figure[:3])):
+        return "the measured figure is not finite"
+    return Figure(float(figure.value), float(figure.low), float(figure.high), figure.interval)
 
 
 def verdict(claim: Claim, figure: Figure) -> str:
-    """Return the verdict on a claim. Where the ends of the interval disagree, nothing can be told."""
-    answers = {claim.holds(value) for value in figure}
-    if len(answers) == 2:
+    """Return the verdict on a claim. Where the interval reaches into both answers, nothing can be told."""
+    answer = claim.holds(figure.low, figure.high)
+    if answer is Answer.UNKNOWN:
         return IMPOSSIBLE
-    return REPRODUCED if answers == {True} else DIFFERS if claim.ours else NOT_REPRODUCED
+    return REPRODUCED if answer is Answer.YES else DIFFERS if claim.ours else NOT_REPRODUCED
 
 
 def judged(claim: Claim, figures: Figures) -> Claim:
@@ -146,10 +173,13 @@ def judged(claim: Claim, figures: Figures) -> Claim:
     figure = taken(claim, figures) if claim.experiment else claim.why
     if isinstance(figure, str):
         return replace(claim, verdict=IMPOSSIBLE if claim.direction or not claim.experiment else None, why=figure)
-    value, low, high = figure
-    claim = replace(claim, measured=value, low=low, high=high)
+    claim = replace(claim, measured=figure.value, low=figure.low, high=figure.high, interval=figure.interval)
     if not claim.direction:
         return claim
     found = verdict(claim, figure)
-    apart = f"cannot be told apart, the figure lies between {low:.3g} and {high:.3g}; " if found == IMPOSSIBLE else ""
-    return replace(claim, verdict=found, why=f"{apart}{claim.rule}: {claim.why}")
+    if found == IMPOSSIBLE:
+        ends = (
+            f"{figure.interval or 'the interval'} from {figure.low:.3g} to {figure.high:.3g}, both answers lie between"
+        )
+        return replace(claim, verdict=found, why=f"cannot be told: {ends}; {claim.rule}: {claim.why}")
+    return replace(claim, verdict=found, why=f"{claim.rule}: {claim.why}")

@@ -10,6 +10,7 @@
   paper's shader evaluates noise at each step and stores distances in 512^3.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -27,9 +28,11 @@ from reference.scene.clouds import CloudScene, read_clouds
 from validation.arrays import Array, Bools, Progress
 from validation.clock import time_repeated
 from validation.estimates.images import Budget, monte_carlo_reference
+from validation.papers.claims import INTERVAL, Figure, quartiles
 from validation.scenes.loading import LoadedScene, load_scene, resize
 from validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
 from validation.scenes.registry import SCENES
+from validation.statistics.samples import LEVEL, student_quantile
 from validation.study.frame_times import first_frame
 from validation.timing import Timing
 
@@ -43,7 +46,6 @@ _HIGH = (0.013, 0.029, -1.0)  #: way of the sun's light over the ring
 _MOST = 16  #: crossings of a ray towards the sun
 _ASIDE, _WIDTH = 250.0, 60.0  #: where searches start beside a point, and how wide [m]
 _APART = 1.0  #: distance of their ends from which on there are two [sigma]
-_SURE = 2.0  #: standard errors to both sides of a mean
 
 #: Three steps at most, one where the collector of the last frame still is one (within 0.05 of its spread).
 WARM: Mapping[str, Any] = {"start": "previous", "iterations": 3, "settled": 0.05}
@@ -58,24 +60,28 @@ def clouds_figures() -> dict[str, Any]:
     pair, shaded = pair_of(loaded, fewer), _shaded(read_clouds(loaded.scene)).reshape(SIZE[::-1])
     figures["gap, shaded"] = _ratio(*pair, shaded)
     part = 100 * float(pair[1][shaded].sum() / pair[1].sum())
-    figures["gap, lost"] = [part * (1 - ratio) for ratio in (figures["gap, shaded"][place] for place in (0, 2, 1))]
+    shaded_ratio = figures["gap, shaded"]
+    value, most, least = (part * (1 - ratio) for ratio in shaded_ratio[:3])
+    figures["gap, lost"] = Figure(value, least, most, INTERVAL)
     loaded = shown(LOBES, SIZE)
     two = _two_collectors(loaded)
     figures["lobes, two"] = _ratio(*pair_of(loaded, fewer), two) if two.any() else "no pixel has two collectors"
     return figures
 
 
-def _ratio(image: Array, reference: Array, error: Array, where: Bools) -> list[float]:
-    """Return the light of an image over that of the reference in some pixels, with the ends of its interval."""
+def _ratio(image: Array, reference: Array, error: Array, where: Bools) -> Figure:
+    """Return the light of an image over that of the reference in some pixels, with its 95 % interval."""
     light, expected = image[where].sum(), reference[where].sum()
     # Errors of colours of one pixel come from the same paths; they are added, not their squares.
-    spread = _SURE * np.sqrt((error[where].sum(-1) ** 2).sum())
-    return [float(light / at) for at in (expected, expected + spread, expected - spread)]
+    half = student_quantile(0.5 + LEVEL / 2, math.inf) * np.sqrt((error[where].sum(-1) ** 2).sum())
+    value, low, high = (float(light / at) for at in (expected, expected + half, expected - half))
+    return Figure(value, low, high, INTERVAL)
 
 
 def cloud_frames() -> dict[str, Any]:
     """Return the frames a second of section 9: after the light moved, with the collectors of the last frame."""
-    return {name: _light_moved(read_scene(load_scene(name, (800, 600)).scene)).rate for name in FRAMES}
+    timings = {name: _light_moved(read_scene(load_scene(name, (800, 600)).scene)) for name in FRAMES}
+    return {name: quartiles(timing.rate) for name, timing in timings.items()}
 
 
 def _light_moved(scene: Scene) -> Timing:
@@ -88,7 +94,7 @@ def _light_moved(scene: Scene) -> Timing:
 
     maps = time_repeated(lambda: renderer.prepare(scene), seconds=1.0)
     frame = time_repeated(work, seconds=1.0)
-    median, low, high = (own + more for own, more in zip(maps.interval, frame.interval, strict=True))
+    median, low, high = (own + more for own, more in zip(maps.quartiles, frame.quartiles, strict=True))
     return Timing(median, low, high, min(maps.repetitions, frame.repetitions))
 
 

@@ -27,7 +27,7 @@ from analytic.phase import PhaseFunction
 from realtime.frame.renderer import FrameRenderer, evaluated, image_frame, render_frame, run_cast_and_shade, run_method
 from realtime.methods.light_volumes.published.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
 from realtime.methods.light_volumes.published.raster import signed_crossings
-from realtime.methods.light_volumes.published.tessellation import configuration, divide, edges, quads, triangles
+from realtime.methods.light_volumes.published.tessellation import divide, edges, quads, triangles
 from realtime.scene.lights import Light
 from realtime.scene.read_scene import Scene, read_scene
 from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
@@ -36,6 +36,7 @@ from validation.arrays import Array, Bools, Index
 from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics, known
+from validation.papers.claims import quartiles
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.meshes import lathe, placed
 from validation.scenes.parts import mitsuba_mesh
@@ -81,7 +82,8 @@ def triangle_times() -> dict[str, Any]:
         planes = methods.prepared(scene, methods.configuration("shadow-planes", "exact"))
         works = [_evaluation(volumes, state, cast, by_light), moved_light(planes)]
         volume, frame = time_in_turns(works, seconds=_SECONDS * len(works))
-        times |= {f"volume, {name}": volume.interval, f"planes, {name}": frame.interval}
+        medians = {"volume": volume.quartiles, "planes": frame.quartiles}
+        times |= {f"{what}, {name}": quartiles(found) for what, found in medians.items()}
     return times
 
 
@@ -103,24 +105,18 @@ def _sphere(facets: int) -> Scene:
 def tessellation() -> dict[str, Any]:
     """Return facts on the mesh of the colonnade, and the errors of two filters and two treatments of depths.
 
-    `configurations` is the number of kinds of quads that occur, `most triangles` the most in a quad; `level steps` is
-    the largest difference of levels between neighbours, `flat` and `jump` are the median sides of the quads without and
-    with a jump of the map [texels]. `our error` and `plain error` compare the airlight with that of the static mesh;
-    `bias ...` and `best bias` are the relative RMSE of the sum with depth testing to the clamped sum.
+    `flat` and `jump` are the median sides of the quads without and with a jump of the map [texels]. `our error` and
+    `plain error` compare the airlight with that of the static mesh; `bias ...` and `best bias` are the relative RMSE of
+    the sum with depth testing to the clamped sum.
     """
     scene = read_scene(load_scene("colonnade", SIZE).scene)
     light = scene.lights[0]
     shadow_map = cast_shadow_map(scene.geometry, light, MAP)
     heights = corner_heights(shadow_map)
     divided = divide(edges(heights, THRESHOLD))
-    used = {int(level) for _, _, sides in quads(divided) for level in np.unique(sides)}
-    level = quad_levels(divided)
-    side, jump = MAP / 2.0**level, _jumps(heights)
+    side, jump = MAP / 2.0 ** quad_levels(divided), _jumps(heights)
     errors = {f"bias {bias:g}": error for bias, error in zip(BIASES, _biased())}
     return {
-        "configurations": len(used),
-        "most triangles": max(len(configuration(sides)) for sides in used),
-        "level steps": max(int(np.abs(np.diff(level, axis=axis)).max()) for axis in (1, 2)),
         "flat": float(np.median(side[~jump])),
         "jump": float(np.median(side[jump])),
         "best bias": min(errors.values()),

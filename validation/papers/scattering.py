@@ -27,6 +27,7 @@ from validation.arrays import Array
 from validation.estimates.monte_carlo import monte_carlo_batches
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
 from validation.metrics.errors import error_metrics, known
+from validation.papers.claims import INTERVAL, Figure
 from validation.scenes.loading import load_scene, resize
 from validation.scenes.parts import camera, fog, point_light
 from validation.scenes.registry import SCENES
@@ -50,7 +51,8 @@ def multiple_scattering() -> dict[str, Any]:
     scene = mi.load_dict(described)
     resize(scene, _SIZE)
     thin = multiple_scattering_fraction(scene, batches=_BATCHES, samples=_SAMPLES).medium
-    return {"left over": max(map(_left_over, _SCENES)), "thin": [thin.value, *thin.interval]}
+    low, high = thin.interval
+    return {"left over": max(map(_left_over, _SCENES)), "thin": Figure(thin.value, low, high, INTERVAL)}
 
 
 def _left_over(name: str) -> float:

@@ -10,8 +10,8 @@ The source prints no equation, no scene and no table of errors; the method is re
 Errors are those of airlight plus surface, as root mean square over the mean, against the quadrature, and in the
 *penumbra*: where the visible surface gets more than 0.02 and less than 0.98 of the light that it would get without
 occluders. Both lights of this fraction are sums over the same sixteen points of the area light, so that a surface that
-sees all of the light has the fraction 1. The interval of a ratio of two errors is that of a jackknife over vertical
-strips of the image.
+sees all of the light has the fraction 1. The 95 % interval of a ratio of two errors is that of a jackknife over
+vertical strips of the image.
 
 *At equal time* R2 and R3 get more steps, so many that by the times of R1 and R2 (linear in the steps) they take as long
 as R4. *Edges* is the median, over the hundredth of the penumbra where the reference is steepest, of the gradient over
@@ -31,7 +31,9 @@ from realtime.scene.read_scene import Scene, read_scene
 from validation.arrays import Array, Bools
 from validation.clock import time_in_turns
 from validation.estimates.quadrature import reference_image
+from validation.papers.claims import INTERVAL, Figure, quartiles
 from validation.scenes.loading import load_scene
+from validation.statistics.samples import LEVEL, student_quantile
 from validation.study.configuration import SHARED_POINTS, Configuration, prepared
 from validation.study.frame_times import moved_light
 from validation.timing import Timing
@@ -43,7 +45,6 @@ STEPS, MANY = 32, 150
 TAPS = (4, 8, 16, 32)
 _FRAMES, _TRAVEL = 5, 0.02  # of the flicker: frames, and how far the light goes from one to the next [m]
 _STRIPS = 16  # of the jackknife
-_SURE = 2.0  # standard errors to both sides of a ratio
 
 #: Names and values of parameters, beside the defaults: 5 points on a ring, uniform steps, hd = 5, hr = 0.5.
 RENDERINGS: Mapping[str, dict[str, Any]] = {
@@ -76,12 +77,12 @@ class Reference:
         expected = self.image[where]
         return float(np.sqrt(np.mean((image[where] - expected) ** 2)) / np.mean(expected))
 
-    def ratio(self, above: Array, below: Array) -> list[float]:
-        """Return the error of an image over that of another, with the ends of its interval."""
+    def ratio(self, above: Array, below: Array) -> Figure:
+        """Return the error of an image over that of another, with its 95 % interval."""
         whole = self.error(above) / self.error(below)
         rest = [self.error(above, strip) / self.error(below, strip) for strip in range(_STRIPS)]
-        spread = _SURE * float(np.sqrt((_STRIPS - 1) * np.var(rest)))
-        return [whole, whole - spread, whole + spread]
+        half = student_quantile(0.5 + LEVEL / 2, _STRIPS - 1) * float(np.sqrt((_STRIPS - 1) * np.var(rest)))
+        return Figure(whole, whole - half, whole + half, INTERVAL)
 
     def edges(self, image: Array) -> float:
         """Return the median gradient of an image over the reference's, at the steepest hundredth of the penumbra."""
@@ -104,7 +105,7 @@ def soft_shafts(size: tuple[int, int] = SIZE, *, seconds: float = 0.3) -> dict[s
         **{f"{name} error": error for name, error in errors.items()},
         **{f"{name} flicker": each for name, each in _flicker(scene, reference).items()},
         "R4 edges": reference.edges(images["R4"]),
-        "R4 fps": times["R4"].rate,
+        "R4 fps": quartiles(times["R4"].rate),
         "R4 over R1": ratio["R4"](images["R1"]),
         "R4 over R2": ratio["R4"](images["R2, equal time"]),
         "R4 over R3": ratio["R4"](images["R3, equal time"]),

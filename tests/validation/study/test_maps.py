@@ -45,6 +45,7 @@ from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import Animation
 from validation.study.causes import decompose
+from validation.statistics.estimate import Answer
 from validation.study.configuration import Configuration, configuration, named_configurations, prepared
 from validation.study.growth import fitted_exponent
 from validation.study.variation import light_references, method_motion
@@ -167,7 +168,7 @@ def test_a_history_lags_by_its_weight_and_planes_do_not(variant):
     assert planes.relative_rmse.value < 1e-5  # float32 beside the light
     assert abs(planes.lag.lag.value) < 1e-4
     assert late.lag.lag.value == pytest.approx(9, abs=0.01)
-    assert late.lag.persistence.above(4)
+    assert late.lag.persistence.exceeds(0.0, 4.0) is Answer.YES
     assert late.flicker_beside_lag.value < late.flicker.value
     np.testing.assert_array_equal(np.array(loaded.scene.emitters()[0].world_transform().matrix), before)
 
