@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from reference.quadrature.adaptive_panels import sum_pieces
 from reference.quadrature.cell_walk import CellWalk, cell_walk
 from reference.quadrature.pieces import Kinks, Pieces, cut, whole
-from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest
+from reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
 from reference.scene.device import on_device, vectors
 from reference.scene.varying import GridMedium
 from reference.visibility.planes import Rays
@@ -40,6 +40,11 @@ class GridField:
     def walk(self) -> CellWalk:
         """The grid on the device."""
         return cell_walk(self.medium)
+
+    @property
+    def bound_kind(self) -> BoundKind:
+        """What the errors are: second derivatives jump within pieces, where two rules may both be wrong."""
+        return "estimated"
 
     @property
     def strongest(self) -> Array:

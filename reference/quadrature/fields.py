@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from reference.quadrature.density_grid import GridField
 from reference.quadrature.height_fog import HeightField
 from reference.quadrature.homogeneous import HomogeneousField
-from reference.quadrature.stretches import TERMS, Stretches, Terms
+from reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms
 from reference.scene.read import ReferenceScene
 from reference.scene.varying import GridMedium, HeightMedium
 from reference.visibility.planes import Rays
@@ -26,6 +26,10 @@ Array = NDArray[np.float64]
 
 class Field(Protocol):
     """The interface of a medium, or of all media of a scene together."""
+
+    @property
+    def bound_kind(self) -> BoundKind:
+        """What the errors of `sums` are."""
 
     @property
     def strongest(self) -> Array:
@@ -42,7 +46,7 @@ class Field(Protocol):
         """Return the distance behind which rays meet nothing that scatters, (n,) [m]; may be infinite."""
 
     def sums(self, rays: Rays, stretches: Stretches, distance: Array, terms: Terms = TERMS) -> tuple[Array, Array]:
-        """Return the airlight of each ray from its lit stretches, and a bound of its error, (rays, 3) each.
+        """Return the airlight of each ray from its lit stretches, and its error by `bound_kind`, (rays, 3) each.
 
         `rays`: in their planes with lights of strength 1: places if `rays.w` is 1 [1/m^2], else directions [1/sr];
         `stretches`: rays, and distances of both ends; the second may be infinite [m]; `distance`: of each ray to the

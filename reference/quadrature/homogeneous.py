@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from reference.quadrature.adaptive_panels import AT_LIGHT, sum_pieces
 from reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
 from reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
-from reference.quadrature.stretches import TERMS, Stretches, Terms, strongest
+from reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
 from reference.scene.convex_bounds import Bounds, Sphere
 from reference.scene.read import ReferenceScene, homogeneous_around
 from reference.visibility.distances import crossed_facets, crossings, sphere_crossings
@@ -49,6 +49,11 @@ class HomogeneousField:
     """The medium around the camera, and media in disjoint convex bounds; a field (`reference.quadrature.fields`)."""
 
     reference: ReferenceScene
+
+    @property
+    def bound_kind(self) -> BoundKind:
+        """What the errors are: on pieces where the integrand is analytic, the worse of two rules bounds the better."""
+        return "proven"
 
     @property
     def strongest(self) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.quadrature.fields import field_of
 from reference.quadrature.ray_values import Progress, RayValues, ReferenceImage, ray_values
 from reference.quadrature.replicates import (
     PILOT,
@@ -25,6 +26,7 @@ from reference.quadrature.replicates import (
     replicate_means,
     standard_error,
 )
+from reference.quadrature.stretches import BoundKind
 from reference.scene.camera import film_directions, pixel_centres
 from reference.scene.read import ReferenceScene
 from reference.scene.shapes import read_shapes
@@ -74,15 +76,22 @@ def quadrature_image(
         raise InputError(f"pixel is '{pixel}'; expected 'centre' or 'area'")
     values = ray_values(reference, progress=progress, plan=plan, keep=keep, **how)
     layers = np.concatenate([values.airlight, values.surface, values.emitted.reshape(len(values.airlight), -1)], axis=1)
-    return _image(reference, values, layers, values.bound, values.replicates if reference.is_sampled else None)
+    replicates = values.replicates if reference.is_sampled else None
+    return _image(reference, values, layers, values.bound, replicates, field_of(reference).bound_kind)
 
 
 def _image(
-    reference: ReferenceScene, centre: RayValues, layers: Array, bound: Array, replicates: Array | None
+    reference: ReferenceScene,
+    centre: RayValues,
+    layers: Array,
+    bound: Array,
+    replicates: Array | None,
+    kind: BoundKind,
 ) -> ReferenceImage:
     """Return the image of layers, (pixels, 6 or 9); distances, angles and checks are those of the centres."""
     shape, checked = (reference.height, reference.width), centre.random_checks
-    extra: dict[str, Any] = {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
+    extra: dict[str, Any] = {"bound_kind": kind}
+    extra |= {"emitted": layers[:, 6:].reshape(*shape, 3)} if layers.shape[1] > 6 else {}
     if replicates is not None:
         errors = standard_error(replicates[:, :6]).reshape(*shape, 6)
         extra |= {"airlight_se": errors[..., :3], "surface_se": errors[..., 3:]}
@@ -151,4 +160,4 @@ def _means(
     if progress is not None:
         progress(rounds, rounds, "positions in pixels")
     checked = replace(centre, random_checks=RandomChecks.of_all([centre.random_checks, *checks]))
-    return _image(reference, checked, means.mean(axis=2), bounds / (REPLICATES * counts[:, None]), means)
+    return _image(reference, checked, means.mean(axis=2), bounds / (REPLICATES * counts[:, None]), means, "estimated")

@@ -28,6 +28,7 @@ from reference.quadrature.emission import emitted_light
 from reference.quadrature.light_airlight import light_airlight
 from reference.quadrature.replicates import Keep, PointPlan
 from reference.quadrature.sky import sky_light
+from reference.quadrature.stretches import BoundKind
 from reference.quadrature.surface import lit_surface, surface_hits
 from reference.scene.directional_light import DirectionalLight
 from reference.scene.read import ReferenceLight, ReferenceScene
@@ -46,7 +47,7 @@ class ReferenceImage:
     """Radiance of every pixel; arrays of shape (height, width[, 3])."""
 
     airlight: Array  #: in-scattered radiance [W/(m^2 sr)]
-    airlight_bound: Array  #: bound of its error; over a pixel's area an estimate [W/(m^2 sr)]
+    airlight_bound: Array  #: its error without that of samples: a bound or an estimate, see `bound_kind` [W/(m^2 sr)]
     surface: Array  #: radiance of the lit surface through the medium [W/(m^2 sr)]
     distance: Array  #: to the visible surface at the pixel's centre, infinite where there is none [m]
     light_angle: Array  #: smallest angle between the centre's ray and the direction to a light before the surface [rad]
@@ -62,6 +63,8 @@ class ReferenceImage:
     #: means over the image of what area lights add to airlight and surface, by replicate of their points, (2,
     #: replicates, 3) [W/(m^2 sr)]
     replicate_means: Array | None = None
+    #: what `airlight_bound` is: 'proven', or 'estimated' in density grids and for means over the areas of pixels
+    bound_kind: BoundKind = "proven"
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Stretches = tuple[Index, Array, Array]  # rays, and distances of both ends [m]
 Profile = Callable[[Array, Index], Array]  # distances, (m, k) [m], and rays, (m,) -> intensity over that on the axis
+#: An error that is an upper bound, derived, or one that follows from what it is of: by two rules, or two steps.
+BoundKind = Literal["proven", "estimated"]
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,12 @@ class Reference:
     """The accuracy of the quadrature."""
 
     mean: Number = column(unit="W/(m^2 sr)", meaning="of the airlight")
-    relative_bound: Number = column(meaning="of its error, three standard errors of area lights added")
+    relative_bound: Number = column(meaning="its error over that mean, three standard errors of area lights added")
+    kind: str | None = column(
+        meaning="of that error: `proven`, `estimated` (density grids) or `statistical` (area lights, skies); `null` in "
+        "reports of 1.0.0",
+        default=None,
+    )
     transitions: int = column(meaning="edges of lit intervals")
     missed: Number = column(meaning="fraction of the first shadow rays that disagreed")
     checked: int = column(meaning="shadow rays that checked the lit intervals")

@@ -160,7 +160,7 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
     left = [f"{scene.name} ({scene.reference.left})" for scene in scenes if scene.reference.left]
     if left:
         text = f"Random shadow rays disagree with lit intervals, and were not resolved: {'; '.join(left)} of them."
-        yield _claim("failed", text + " They are counted in the bound of the reference.", False)
+        yield _claim("failed", text + " They are counted in the error of the reference.", False)
 
 
 def _pixels(scene: str, m: Row, count: str) -> str:

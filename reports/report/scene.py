@@ -16,6 +16,7 @@ from reports.machine.environment import stamped
 from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
 from validation.columns import record_of
 from validation.estimates.images import layered_reference
+from validation.estimates.quadrature import known_to
 from validation.scenes.loading import scene_stem
 from validation.study.reference import of_image
 from validation.study.scene import Judged, SceneResult
@@ -76,7 +77,9 @@ def reference_record(reference: ReferenceImage) -> Reference:
     mean = float(reference.airlight[finite].mean()) if finite.any() else float("nan")
     numbers = ("transitions", "missed", "checked", "disagreements", "refined", "left")
     bound = float(of_image(reference).bound[finite].mean()) / mean if mean > 0 else None
-    found = {"mean": mean, "relative_bound": bound} | {name: getattr(reference, name) for name in numbers}
+    found = {"mean": mean, "relative_bound": bound, "kind": known_to(reference, "airlight").kind} | {
+        name: getattr(reference, name) for name in numbers
+    }
     return record_of(found, Reference)
 
 

@@ -67,20 +67,22 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
     estimators = list(dict.fromkeys(entry.estimator for scene in scenes for entry in scene.agreement.values()))
     columns = (
         *words("scene"),
-        *numbers(bound="bound of its error", how={"fraction": True, "digits": 2}),
+        *numbers(bound="its error", how={"fraction": True, "digits": 2}),
+        *words(kind="which is"),
         *numbers(left="unresolved shadow rays", how={"alarm": True}),
         *(Column(name, f"95 % interval by {name}", percent=True, sign=True, digits=2) for name in estimators),
         *(Column(f"{name} agrees", "inside its margin") for name in estimators),
     )
-    order = ["scene", "bound", "left", *(key for name in estimators for key in (name, f"{name} agrees"))]
+    order = ["scene", "bound", "kind", "left", *(key for name in estimators for key in (name, f"{name} agrees"))]
     return table(
         "The reference of each scene",
         columns,
         (_trust(scene, estimators) for scene in scenes),
         explanation=(
-            "The reference is a quadrature in double precision, with a bound of its error as a fraction of the mean "
-            "airlight. Two Monte Carlo estimators, which share no derivation with it, check it: the 95 % interval of "
-            "their relative bias must lie inside a margin. Among several layers the interval that fills most of its "
+            "The reference is a quadrature in double precision, with its error as a fraction of the mean airlight: "
+            "proven, estimated in density grids, or three standard errors of samples of area lights and skies. Two "
+            "Monte Carlo estimators, which share no derivation with it, check it: the 95 % interval of their relative "
+            "bias must lie inside a margin. Among several layers the interval that fills most of its "
             "margin is shown; each scene below has them all."
         ),
     ).only(*order)
@@ -88,7 +90,7 @@ def trust_table(scenes: Sequence[Scene]) -> Table:
 
 def _trust(scene: Scene, estimators: Iterable[str]) -> Row:
     values: dict[str, Value] = {"scene": scene.name, "bound": scene.reference.relative_bound}
-    values["left"] = scene.reference.left
+    values |= {"kind": scene.reference.kind, "left": scene.reference.left}
     for name in estimators:
         compared = [entry for entry in scene.agreement.values() if entry.estimator == name]
         if not compared:

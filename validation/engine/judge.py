@@ -53,10 +53,17 @@ from validation.engine.seen import (
     scene_of_size,
 )
 from validation.estimates.agreement import pixel_angle
-from validation.estimates.quadrature import reference_error, reference_image, reference_layer
+from validation.estimates.quadrature import (
+    known_to,
+    known_words,
+    reference_error,
+    reference_image,
+    reference_layer,
+)
 from validation.metrics.errors import FLOOR
 from validation.scenes.loading import LoadedScene
 from validation.statistics.comparison import block_sums
+from validation.statistics.estimate import Estimate
 
 ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
 
@@ -96,9 +103,7 @@ class EngineComparison:
     kind: PixelKind  #: what a pixel is, and how well either kind fits where the two references differ
     hints: Hints  #: what may be wrong with the image as a whole
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
-    reference_error: (
-        float  #: bound of the error of the reference's airlight, with its standard error, relative to its mean
-    )
+    known: Estimate  #: mean of the layer of the reference that it was compared with, and its error [W/(m^2 sr)]
     comparison: Comparison
     place: ErrorPlace | None  #: where most of the error lies; None where there is none
     verdict: Verdict
@@ -117,7 +122,7 @@ class EngineComparison:
         of = "airlight + surface" if self.expected == TOTAL else self.expected
         lines = [
             f"scene            {self.scene}, {self.size[0]} x {self.size[1]}; reference: {of}, "
-            f"{PIXEL_WORDS[self.pixel]}, airlight known to {self.reference_error:.2g} of its mean",
+            f"{PIXEL_WORDS[self.pixel]}, {known_words(self.known)}",
             f"pixels           {self.kind.words}",
             self.comparison.summary(),
         ]
@@ -223,7 +228,7 @@ def judge_image(
         kind=kind,
         hints=hints,
         expected=judged.holds,
-        reference_error=relative_bound(fitting),
+        known=known_to(fitting, judged.holds),
         comparison=comparison,
         place=error_place(wanted, test, lamp_distance(loaded, fitting)),
         verdict=judge(wanted, test, hints, comparison.failures),
@@ -238,16 +243,6 @@ def references(loaded: LoadedScene, progress: Progress | None = None) -> Callabl
     """Return a function that computes the reference at pixel centres or over their areas, or reads the cache."""
     tell = None if progress is None else lambda done, total, what: progress(done / total, what)
     return cache(lambda pixel: reference_image(loaded.scene, pixel=pixel, progress=tell))
-
-
-def relative_bound(reference: ReferenceImage) -> float:
-    """Return how well the airlight is known relative to its mean, where both are finite: its bound + standard error."""
-    error = (
-        reference.airlight_bound if reference.airlight_se is None else reference.airlight_bound + reference.airlight_se
-    )
-    finite = np.isfinite(reference.airlight) & np.isfinite(error)
-    mean = float(reference.airlight[finite].mean()) if finite.any() else 0.0
-    return float(error[finite].mean()) / mean if mean > 0 else 0.0
 
 
 def lamp_distance(loaded: LoadedScene, reference: ReferenceImage) -> Array:

@@ -76,6 +76,7 @@ def layered_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: 
     layers |= {layer: values for layer, values in extent.items() if values is not None}
     made: dict[str, str | int | float] = {"airlight:scene": loaded.name, "airlight:estimator": "quadrature"}
     made |= {"airlight:pixel": pixel, **_digest_of(loaded)}
+    made["airlight:bound"] = reference.bound_kind
     if reference.airlight_se is not None:
         made["airlight:batches"] = REPLICATES
     return Image(layers, reference.distance, made)

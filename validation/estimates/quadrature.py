@@ -42,6 +42,7 @@ from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from reference.storage.exr import TOTAL
 from reference.storage.kept import kept, load, store
 from validation.arrays import Array, Bools, Counted
+from validation.statistics.estimate import UNKNOWN, Estimate, Kind
 
 _ROUNDING = 2.0**-24
 
@@ -134,6 +135,38 @@ def reference_error(reference: ReferenceImage, layer: str) -> Array | None:
     if layer == TOTAL:
         return np.hypot(reference.airlight_se, reference.surface_se)
     return np.asarray(getattr(reference, f"{layer}_se"))
+
+
+def known_to(reference: ReferenceImage, layer: str) -> Estimate:
+    """Return the mean of a layer, and the mean error of its pixels, where these are finite [W/(m^2 sr)].
+
+    That of the airlight is proven or estimated as its bound is, and statistical where lights or positions are sampled:
+    a standard error then. Surfaces are Mitsuba's in single precision: nothing says how far they are off where they are
+    not sampled.
+    """
+    values, sampled = reference_layer(reference, layer), reference_error(reference, layer)
+    kind: Kind = reference.bound_kind if sampled is None else "statistical"
+    errors = np.zeros_like(values) if sampled is None else sampled
+    if layer != "surface":
+        errors = errors + reference.airlight_bound
+    finite = np.isfinite(values) & np.isfinite(errors)
+    if not finite.any():
+        return UNKNOWN
+    unknown = layer != "airlight" and sampled is None
+    return Estimate(float(values[finite].mean()), None if unknown else float(errors[finite].mean()), kind)
+
+
+def known_words(estimate: Estimate) -> str:
+    """Return how well a layer is known, in words."""
+    relative = relative_error(estimate)
+    if relative is None:
+        return "its error is not known"
+    return f"known to {relative:.2g} of its mean ({estimate.kind})"
+
+
+def relative_error(estimate: Estimate) -> float | None:
+    """Return an error over its value; None where one is not known, or the value is 0."""
+    return estimate.error / estimate.value if estimate.value and estimate.error is not None else None
 
 
 def check_camera(reference: ReferenceScene) -> None:

@@ -27,16 +27,16 @@ from reference.scene.read import ReferenceScene, read_reference
 from reference.storage.exr import NOTE, read_exr
 from reference.storage.files import temporary_folder
 from validation.arrays import Array, Bools, Index, Progress
-from validation.engine.judge import lamp_distance, relative_bound
+from validation.engine.judge import lamp_distance
 from validation.engine.seen import PIXELS, JudgedLayer, expected_layer, judged_layer, pixel_kinds, scene_of_size
-from validation.estimates.quadrature import reference_image
+from validation.estimates.quadrature import known_to, known_words, reference_image, relative_error
 from validation.motion.blocks import BLOCK
 from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
 from validation.motion.lag import SURE, Lag
 from validation.motion.measures import AGES, Measures, Sequence, measure
 from validation.scenes.changes import move_shapes, shift_film
 from validation.scenes.loading import load_scene
-from validation.statistics.estimate import Answer, Estimate
+from validation.statistics.estimate import Answer, Estimate, fact
 from validation.statistics.samples import UNTOLD_SERIES
 
 _ROUNDING = 1e-6  # relative error of exact frames in files of float32
@@ -68,7 +68,7 @@ class MotionComparison:
     layer: str
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
     pixel: str
-    reference_error: float  #: of the worst frame, relative to its mean
+    known: Estimate  #: mean of the layer of the reference, and its error, of the worst frame [W/(m^2 sr)]
     masks: Mapping[str, Measures]  #: 'all' first
     verdict: MotionVerdict
     lag_ms: float | None  #: None where the frames have no rate
@@ -88,7 +88,7 @@ class MotionComparison:
         width, height = self.size
         lines = [
             f"scene            {self.scene}, {width} x {height}, {self.frames} frames; reference: "
-            f"{self.expected}, pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
+            f"{self.expected}, pixel {self.pixel}, {known_words(self.known)}",
             f"values           {found.values}, {found.nonfinite} not finite; the reference changes by "
             f"{_percent(found.reference_change)} a frame",
             f"relative RMSE    {found.relative_rmse.percent()}, relative bias {found.bias.percent()}",
@@ -163,7 +163,7 @@ def compare_frames(
         notes += (f"{paths[0]}: {first.attributes[NOTE]}",)
     found = masks["all"]
     lag = found.lag.lag.value
-    verdict = motion_verdict(found, frames.reference_error)
+    verdict = motion_verdict(found, relative_error(frames.known))
     failures = []
     if any(frames.nonfinite):
         wrong = [f"{n} ({path.name})" for n, path in enumerate(paths) if frames.nonfinite[n]]
@@ -179,7 +179,7 @@ def compare_frames(
         layer=judged.name,
         expected=judged.holds,
         pixel=kinds[0],
-        reference_error=frames.reference_error,
+        known=frames.known,
         masks=masks,
         verdict=verdict,
         lag_ms=None if lag is None or record.fps is None else 1000 * lag / record.fps,
@@ -194,7 +194,7 @@ class _Frames:
 
     def __init__(self, folder: Path, scene: str, record: FramesRecord, judged: JudgedLayer, pixel: str) -> None:
         self._folder, self._scene, self._record, self._judged, self._pixel = folder, scene, record, judged, pixel
-        self.reference_error = 0.0
+        self.known = fact(0.0)  # of the frame that is known worst
         self.nonfinite: list[int] = []  # values of each frame that are NaN or infinite
         shape = (record.frames, *judged.values.shape[:2])
         self._uncovered, self._beside = np.zeros((2, *shape), dtype=bool)
@@ -229,7 +229,7 @@ class _Frames:
             except InputError as error:
                 raise InputError(f"frame {n}: {error}") from error
             self._shown.append(n)
-            self.reference_error = max(self.reference_error, relative_bound(image))
+            self.known = max(self.known, known_to(image, self._judged.holds), key=_doubt)
             np.save(self._folder / f"reference-{n}.npy", expected_layer(image, self._judged))
             self._beside[n] = lamp_distance(loaded, image) <= _BESIDE
             self._uncover(image.distance, read_reference(loaded.scene))
@@ -274,6 +274,12 @@ class _Frames:
         self._ages = np.where(~inside | hidden, 0.0, self._ages[row, column] + 1).reshape(distance.shape)
 
 
+def _doubt(known: Estimate) -> float:
+    """Return the relative error of a reference; infinite where it is not known, and below any where all is dark."""
+    relative = relative_error(known)
+    return relative if relative is not None else math.inf if known.value else -1.0
+
+
 def _blocks(some: Bools) -> slice:
     """Return the rows, or columns, from the first of the blocks that have some to the last."""
     places = np.flatnonzero(some) if some.any() else np.zeros(1, dtype=int)
@@ -306,11 +312,15 @@ def _shifts(sequence: Sequence) -> dict[int, float]:
     return {shift: math.sqrt(sums[shift] * len(frames)) / light for shift in shifts}
 
 
-def motion_verdict(measures: Measures, reference_error: float = 0.0) -> MotionVerdict:
-    """Return the verdict on a sequence from its measures, see the module."""
+def motion_verdict(measures: Measures, reference_error: float | None = None) -> MotionVerdict:
+    """Return the verdict on a sequence from its measures, see the module.
+
+    `reference_error`: of the references, relative to their mean; None where it is not known.
+    """
     # The RMSE of these frames is a fact: only what the reference does not know itself stands between it and zero.
     rmse = measures.relative_rmse.value
-    if rmse is not None and rmse <= max(_ROUNDING, 3 * reference_error):
+    limit = _ROUNDING if reference_error is None else max(_ROUNDING, 3 * reference_error)
+    if rmse is not None and rmse <= limit:
         return MotionVerdict("exact", f"exact: relative RMSE {rmse:.2g}")
 
     # Nothing is said of a filter whose numbers have no errors, or large ones.

@@ -48,8 +48,9 @@ from analytic.errors import InputError
 from reference.storage.exr import read_exr
 from validation.arrays import Array, Progress
 from validation.engine.images import image_times
-from validation.engine.judge import fitting_kind, references, relative_bound
+from validation.engine.judge import fitting_kind, references
 from validation.engine.seen import expected_layer, judged_layer, pixel_kinds, scene_of_size
+from validation.estimates.quadrature import known_to, known_words
 from validation.motion.blocks import estimates, parts_of_error, products
 from validation.motion.lag import SURE
 from validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
@@ -277,7 +278,7 @@ class NoiseComparison:
     layer: str
     expected: str  #: what the layer was compared with: 'airlight', 'surface', or 'total' for both
     pixel: str
-    reference_error: float  #: relative to the mean
+    known: Estimate  #: mean of the layer of the reference, and its error [W/(m^2 sr)]
     noise: Noise
     nonfinite: int  #: values that are not finite in some run, left out of all
     device: str  #: empty where no file says it
@@ -293,7 +294,7 @@ class NoiseComparison:
             averages = [f"{count} runs: {100 * noise.after(count):.3g} %" for count in (4, 16, 64, 256)]
         lines = [
             f"scene            {self.scene}, {width} x {height}, {noise.runs} runs; reference: {self.expected}, "
-            f"pixel {self.pixel}, known to {self.reference_error:.2g} of its mean",
+            f"pixel {self.pixel}, {known_words(self.known)}",
             f"bias             {noise.bias.percent()}, squared {noise.squared_bias.words()}",
             f"noise            {noise.deviation.percent()} of a run, variance {noise.variance.words()}; relative RMSE "
             f"{100 * noise.relative_rmse:.4g} %",
@@ -368,7 +369,7 @@ def compare_runs(
         layer=first.name,
         expected=first.holds,
         pixel=kind.pixel,
-        reference_error=relative_bound(fitting),
+        known=known_to(fitting, first.holds),
         noise=noise,
         nonfinite=nonfinite,
         device="" if time is None else time[1],

@@ -40,7 +40,9 @@ class ReferenceError:
     estimator: str = column("reference", "", "estimator of the reference")
     mean: float = column("mean", RADIANCE, "mean of the reference airlight")
     error: float | None = column(
-        "own error", "1", "the mean of the bound of its error over its mean, three standard errors of area lights added"
+        "own error",
+        "1",
+        "its mean error over its mean, three standard errors of area lights added",
     )
     worst: float | None = column("own error, worst", "1", "that of the worst pixel, relative to it as in `error.max`")
     seconds: float = column("time", "s", "that it took when it was computed, shared by all cells of the scene")

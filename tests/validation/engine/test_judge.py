@@ -15,7 +15,7 @@ from validation.engine.hints import find_hints
 from validation.engine.images import EngineImage, measure_image
 from validation.engine.judge import compare_scene, judge, references
 from validation.engine.seen import expected_layer, judged_layer, seen_image
-from validation.estimates.quadrature import reference_error, reference_image, reference_layer
+from validation.estimates.quadrature import reference_error, reference_image, reference_layer, relative_error
 from validation.scenes.loading import load_scene
 
 
@@ -57,7 +57,8 @@ def test_airlight_is_compared_where_there_is_one(scene, expected, write):
     )
     assert verdict.comparison.metrics.relative_rmse < 1e-6  # the file is float32
     assert (verdict.comparison.failures, verdict.hints.words) == ((), ())
-    assert 0 <= verdict.reference_error < 1e-6
+    assert 0 <= relative_error(verdict.known) < 1e-6
+    assert verdict.known.kind == "proven"
     verdict = compare_scene(scene, write(airlight=expected.airlight, surface=2 * expected.surface), layer="surface")
     np.testing.assert_allclose(verdict.comparison.metrics.relative_bias, 1, rtol=1e-6)
 
@@ -139,7 +140,8 @@ def test_the_references_own_standard_errors_count_as_those_of_its_file(tmp_path,
     assert by_scene.reference_variance_fraction == pytest.approx(by_file.reference_variance_fraction, rel=1e-5)
     assert by_scene.relative_bias_ci == pytest.approx(by_file.relative_bias_ci, rel=1e-5, abs=1e-7)
     assert by_file.reference_variance_fraction > 0.9
-    assert compared.reference_error > expected.airlight_se.mean() / expected.airlight.mean()
+    assert compared.known.kind == "statistical"
+    assert compared.known.error >= errors.mean()
 
 
 def test_layers_that_are_not_there_are_refused(scene, expected, write):

@@ -20,9 +20,17 @@ from tests.helpers.scenes import spot, tiny_scene
 from validation.estimates.agreement import layer_masks, reference_estimate
 from validation.estimates.images import layered_reference
 from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.quadrature import reference_error, reference_image, reference_layer, reference_of_pixels
+from validation.estimates.quadrature import (
+    known_to,
+    known_words,
+    reference_error,
+    reference_image,
+    reference_layer,
+    reference_of_pixels,
+)
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.statistics.comparison import NoisyImage, compare_statistics
+from validation.statistics.estimate import Estimate
 
 
 @pytest.fixture
@@ -143,11 +151,19 @@ def test_variances_of_the_total_add_up():
         layer, 0 * layer, 2 * layer, none, none, 0, 0.0, emitted=5 * layer, airlight_se=3 * layer, surface_se=4 * layer
     )
     assert reference_error(plain, "total") is None
+    # The error of the airlight is not that of all layers: of surfaces there is none, and so none of the sum.
+    assert known_to(plain, "airlight") == Estimate(float(layer.mean()), 0.0, "proven")
+    for unknown in ("surface", "total"):
+        assert known_to(plain, unknown).error is None
+        assert known_words(known_to(plain, unknown)) == "its error is not known"
     assert reference_layer(plain, "total") == pytest.approx(3 * layer)
     assert reference_layer(lit, "total") == pytest.approx(8 * layer)
     assert reference_layer(lit, "total", emitted=False) == pytest.approx(3 * layer)
     assert reference_error(lit, "total") == pytest.approx(5 * layer)
     assert reference_error(lit, "surface") == pytest.approx(4 * layer)
+    for name, error in (("airlight", 3), ("surface", 4), ("total", 5)):
+        assert known_to(lit, name).error == pytest.approx(error * layer.mean())
+        assert known_to(lit, name).kind == "statistical"
 
 
 @pytest.mark.parametrize("common", [1.0, 0.0], ids=["all pixels are wrong together", "each by itself"])

@@ -44,8 +44,8 @@ from validation.estimates.quadrature import reference_image
 from validation.metrics.errors import error_metrics
 from validation.scenes.loading import load_scene
 from validation.scenes.registry import Animation
-from validation.study.causes import decompose
 from validation.statistics.estimate import Answer
+from validation.study.causes import decompose
 from validation.study.configuration import Configuration, configuration, named_configurations, prepared
 from validation.study.growth import fitted_exponent
 from validation.study.variation import light_references, method_motion
