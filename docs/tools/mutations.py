@@ -61,7 +61,7 @@ OPERATORS = (  # each of one kind: two comparisons that differ in equality alone
     "ReplaceComparisonOperator_GtE_Gt",
     "ZeroIterationForLoop",
 )
-#: A mutation may make a loop endless. Tests take longer beside other work; their process starts in some ten seconds.
+#: A mutation may make a loop that never ends. Tests take longer beside other work; a process starts in ten seconds.
 PATIENCE, START = 5.0, 60.0
 LONGEST = 120.0  #: what the tests of a mutation may take together, without START [s]
 
