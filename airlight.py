@@ -89,7 +89,7 @@ if TYPE_CHECKING:  # the public names: editors complete them from here, and at r
     from validation.metrics.errors import error_metrics as error_metrics
     from validation.scenes.registry import SCENES as SCENES
     from validation.study.configuration import configuration as configuration
-    from validation.study.frame_times import time_frame as time_frame
+    from validation.study.turns import time_frame as time_frame
 
 
 def _exported() -> dict[str, tuple[str, str]]:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.clock import Clock
+
 # A process that a shell starts in the background ignores Ctrl-C, and so would the commands that tests interrupt.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -72,6 +74,14 @@ def own_cache(monkeypatch, tmp_path) -> Path:
     """An empty cache that this test shares with no other; where its folder will be."""
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+@pytest.fixture
+def clock(variant, monkeypatch) -> Clock:
+    """The clock of all times in this process, which goes on only where a test says so."""
+    clock = Clock()
+    monkeypatch.setattr("analytic.clock.time", clock)
+    return clock
 
 
 @pytest.fixture(autouse=True, scope="module")

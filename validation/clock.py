@@ -8,16 +8,23 @@ medians with quartiles.
 
 import ctypes
 import gc
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import drjit as dr
 import numpy as np
 
 from analytic.clock import Spent, stopwatch
 from validation.timing import Timing
+
+#: In which pieces of work take turns: five ends of rounds show a change of the machine that lasts a fifth of a run, and
+#: the median of five is not moved by two that it spoiled.
+ROUNDS = 5
 
 _MIB = 1024  # of the numbers in `status` [KiB]
 _FORGET = "5"  # what makes Linux forget the peak so far
@@ -50,26 +57,55 @@ def time_in_turns(
 ) -> list[Timing]:
     """Time several pieces of work in turns, so that other load on the machine affects all of them alike.
 
-    Parameters are those of `time_repeated`; `seconds`, `least` and `most` are of all turns together.
+    Parameters are those of `time_repeated`; `seconds` are of all works together, `least` and `most` of each.
     """
     for _ in range(warm_up):
         for work in works:
             timed(work)
-    turns: list[list[Spent]] = []
-    so_far = stopwatch()
-    while len(turns) < least or (so_far().seconds < seconds and len(turns) < most):
-        turns.append([timed(work)[1] for work in works])
-    return [
-        timing_of([each.ms for each in spent], cpu_ms=min(each.cpu_ms for each in spent))
-        for spent in zip(*turns, strict=True)
-    ]
+    share = seconds / max(len(works), 1)
+    pieces = [Piece(partial(_spent, work), share) for work in works]
+    return [timing_of(list(chain(*rounds))) for rounds in in_turns(pieces, rounds=least, most=most)]
 
 
-def timing_of(milliseconds: Iterable[float], *, cpu_ms: float | None = None) -> Timing:
-    """Return median and quartiles of some times [ms]."""
-    times = list(milliseconds)
-    low, median, high = (float(value) for value in np.percentile(times, [25, 50, 75]))
-    return Timing(median, low, high, len(times), cpu_ms)
+@dataclass(frozen=True)
+class Piece(Generic[T]):
+    """A piece of work that takes turns with others."""
+
+    work: Callable[[], T]  #: does it once, and returns what it took
+    seconds: float  #: to spend on it in all rounds together; once a round is the least
+    rounds: int | None = None  #: in how many rounds it takes part, None for all
+
+
+def in_turns(pieces: Sequence[Piece[T]], *, rounds: int = ROUNDS, most: int = 200) -> list[list[list[T]]]:
+    """Do pieces of work in turns and return what they gave, by piece, by round in which it takes part, by repetition.
+
+    In each round every piece is repeated for its part of its seconds, so that what it left in the caches of the machine
+    is there as in an animation. A piece that takes part in few rounds has them evenly among all. `most` is the largest
+    number of repetitions in all rounds together.
+    """
+    results: list[list[list[T]]] = [[] for _ in pieces]
+    for number in range(rounds):
+        for piece, of_rounds in zip(pieces, results, strict=True):
+            share = rounds if piece.rounds is None else piece.rounds
+            if (number + 1) * share // rounds == number * share // rounds:
+                continue
+            # By the end of this round it may have been done so often.
+            largest = most * (number + 1) // rounds - sum(map(len, of_rounds))
+            took, repetitions = stopwatch(), [piece.work()]
+            while len(repetitions) < largest and took().seconds < piece.seconds / rounds:
+                repetitions.append(piece.work())
+            of_rounds.append(repetitions)
+    return results
+
+
+def _spent(work: Callable[[], Any]) -> Spent:
+    return timed(work)[1]
+
+
+def timing_of(spent: Sequence[Spent]) -> Timing:
+    """Return median and quartiles of what repetitions took, and their least processor time."""
+    low, median, high = (float(value) for value in np.percentile([each.ms for each in spent], [25, 50, 75]))
+    return Timing(median, low, high, len(spent), min(each.cpu_ms for each in spent) or None)
 
 
 def peak_memory(work: Callable[[], Any]) -> float | None:

@@ -1,11 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Times that were measured, as rows and reports hold them, without Dr.Jit; `validation.clock` measures them."""
+"""Times that were measured, as rows and reports hold them, without Dr.Jit; `validation.clock` measures them.
 
-from collections.abc import Mapping
+Times may be compared where they are of one *run*: there all works take turns, in rounds, so that a change of the
+machine affects all of them alike. An *anchor*, the same work for every method, is repeated at the beginning and at the
+end of each round, and says whether the machine changed meanwhile. `anchored` has the rule.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from validation.columns import column
+
+#: Repetitions of an anchor at each end of a round. A median of n repetitions that scatter by a standard deviation s has
+#: the standard error 1.253 s/sqrt(n), and quartiles lie 1.349 s apart. Of ten medians, of five rounds with two ends, the
+#: farthest two are less than 5.16 standard errors apart in 99 runs of 100, by the normal law: that is the distance of
+#: the quartiles for n = (5.16 * 1.253/1.349)^2 = 23, so that a machine which does not change passes.
+ANCHORS = 25
 
 
 @dataclass(frozen=True)
@@ -17,7 +29,7 @@ class Timing:
     high_ms: float = column("third quartile", "ms", "upper quartile, of the wall clock")
     repetitions: int = column("repetitions", "1", "how often it was measured")
     cpu_ms: float | None = column(
-        "processor", "ms", "least processor time, of all threads; null where stages were timed", default=None
+        "processor", "ms", "least processor time, of all threads; null where it is not known", default=None
     )
 
     @property
@@ -29,6 +41,47 @@ class Timing:
     def rate(self) -> list[float]:
         """How often a second, with the quartiles [1/s]."""
         return [1000 / self.median_ms, 1000 / self.high_ms, 1000 / self.low_ms]
+
+
+@dataclass(frozen=True)
+class TimingRun:
+    """A run in which times were measured in turns; times of one run may be compared."""
+
+    started: str = column("timed", meaning="when the run of these times began; rows of one run have the same")
+    rounds: int = column("rounds", "1", "of the run: in each of them every work takes its turn")
+    anchor: Timing | None = column(
+        "anchor", meaning="camera rays alone, the anchor of the run, at both ends of each round", default=None
+    )
+    between: float | None = column("between", "1", "largest over smallest median of the anchor", default=None)
+    within: float | None = column(
+        "within", "1", "upper over lower quartile of the anchor at one end of a round, geometric mean", default=None
+    )
+
+    steady: bool | None = column(
+        "steady",
+        "",
+        "whether scatter within the ends of rounds explains `between`; null where no anchor says so",
+        default=None,
+    )
+
+
+def anchored(started: str, rounds: int, ends: Sequence[Timing], whole: Timing) -> TimingRun:
+    """Return a run from the times of its anchor: at the `ends` of its rounds, and of all of these together.
+
+    The machine was steady where the medians of the anchor have no larger ratio than its quartiles at one end of a
+    round: a chart shows quartiles as bars, and such a change moves no point out of its bar. Each end has at least
+    `ANCHORS` repetitions.
+    """
+    medians = [end.median_ms for end in ends]
+    between = max(medians) / min(medians)
+    within = math.exp(sum(math.log(end.high_ms / end.low_ms) for end in ends) / len(ends))
+    return TimingRun(started, rounds, whole, between, within, between <= within)
+
+
+def joined(runs: Sequence[TimingRun]) -> TimingRun:
+    """Return runs of one anchor as one run, whose ends of rounds are these runs."""
+    anchors = [run.anchor for run in runs if run.anchor is not None]
+    return anchored(runs[0].started, sum(run.rounds for run in runs), anchors, anchors[0])
 
 
 @dataclass(frozen=True)
@@ -53,11 +106,12 @@ class FrameTimes:
     colours_changed: Timing | None = column(
         "colours changed", "ms", "a frame after only medium or colours changed", default=None
     )
+    run: TimingRun | None = column(meaning="null for times that another program measured", default=None)
 
     @property
     def measured(self) -> dict[str, Timing]:
         """The times that were measured, by name."""
-        return {name: timing for name, timing in vars(self).items() if timing is not None}
+        return {name: timing for name, timing in vars(self).items() if isinstance(timing, Timing)}
 
     @property
     def medians(self) -> dict[str, float]:
@@ -102,3 +156,7 @@ class Scaling:
         "between two steps, the work `at` the second, and whether that is a `cliff`"
     )
     refused: str | None = column(meaning="why the steps end early; `null` if all were made")
+    run: TimingRun | None = column(
+        meaning="of all steps: `between` compares the anchor, camera rays of the first step, over the steps",
+        default=None,
+    )

@@ -34,7 +34,7 @@ from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
 from validation.scenes.registry import SCENES
 from validation.study.configuration import configuration, parse_settings, prepared
-from validation.study.frame_times import time_frame
+from validation.study.turns import time_frame
 
 DOCS = Path(__file__).resolve().parents[1]
 FOLDER = DOCS / "gallery"

@@ -270,14 +270,13 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     import drjit as dr
 
     from realtime.frame.samples import render_samples
-    from realtime.methods.shader.source import is_shader
     from realtime.scene.read_scene import describe
     from reports.api.results import Rendering, sealed
     from reports.machine.environment import activate
     from validation.study.configuration import prepared
     from validation.study.cost import TIMED
-    from validation.study.frame_times import shader_times, time_frame
     from validation.study.run import layered_frame
+    from validation.study.turns import time_alone
 
     variant, chosen = activate(), asked.chosen
     loaded, read, renderer, layered = _ready(asked, samples + (TIMED if timed else 0), samples == 1, progress)
@@ -290,10 +289,9 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
         made |= {"airlight:run": str(asked.run), "airlight:frame": str(asked.frame)}
     image = replace(image, attributes=dict(image.attributes) | made)
     times, device = None, f"{variant}, {dr.thread_count()} threads"
-    if timed and is_shader(chosen.method):
-        device, times = shader_times(renderer, 0.6)
-    elif timed:  # the further layers of a method do not belong to what a frame costs
-        times = time_frame(prepared(read, chosen) if layered else renderer)
+    if timed:  # the further layers of a method do not belong to what a frame costs
+        found = time_alone(prepared(read, chosen) if layered else renderer)
+        times, device = found.times, found.device or device
     return Rendering(
         scene=loaded.name,
         image=sealed(image),

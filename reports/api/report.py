@@ -88,10 +88,10 @@ class Report(Result):
 
     @property
     def lines(self) -> Sequence[str]:
-        """Where it was written."""
+        """Where it was written, and when its times were measured."""
         count = len(self.data.scenes)
         page = f"{self.page}: {count} scene{'' if count == 1 else 's'}, {self.done}"
-        return [page, *self.figures]
+        return [page, *(claim.text for claim in self.data.claims if claim.kind == "times"), *self.figures]
 
     @property
     def title(self) -> str:
@@ -135,7 +135,8 @@ def report(
 
     The page is report.html, next to report.json and each image as EXR and PNG.
 
-    Results that this machine measured before, with the same code and scenes, come from the cache. The exit status is 1
+    Results that this machine measured before, with the same code and scenes, come from the cache; the times of a scene
+    are of one run of all its methods, and are measured again if any of these is new. The exit status is 1
     if single-scatter or volpath does not confirm the reference within the margin, or if a user method fails: the report
     says how.
 

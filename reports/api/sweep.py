@@ -13,10 +13,10 @@ from reports.tables.record import Result, Said
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Place
-    from reports.cluster.run import Group
+    from reports.cluster.run import Group, Task
     from validation.study.keys import Made
     from validation.study.rows import RowStore
-    from validation.study.study import Study
+    from validation.study.study import Cell, Study
 
 _USUAL = 100  # random scenes of a study without a file
 _EVERY = 300.0  # between two times that the Parquet is written while rows come [s]
@@ -156,12 +156,15 @@ def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, pro
     made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
     problems: list[Problem] = []
 
-    def with_errors(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
-        value = outcome.value if outcome.status == "done" else row_without_numbers(cell, key, outcome)
-        return value | {"study": study.name, "attempts": outcome.attempts}
+    def with_errors(outcome: Any) -> list[dict[str, Any]]:
+        (cell, key), done = outcome.task.arguments, outcome.status == "done"
+        row = outcome.value if done else row_without_numbers(cell, key, outcome)
+        return [row | {"study": study.name, "attempts": outcome.attempts}]
 
-    def with_times(cell: Any, key: str, outcome: Any) -> dict[str, Any]:
-        return store.row(key) | (outcome.value if outcome.status == "done" else {})
+    def with_times(outcome: Any) -> list[dict[str, Any]]:
+        """Return the rows of an image with their times; without a process that timed them they are as they were."""
+        columns = outcome.value if outcome.status == "done" else {}
+        return [store.row(key) | values for key, values in columns.items()]
 
     how: dict[str, Any] = {"made": made, "problems": problems, "progress": progress}
     # Images that nobody times are rendered once: their kernels compile longer than they run.
@@ -191,31 +194,41 @@ def _part(
     store: "RowStore",
     place: "Place",
     groups: "list[Group]",
-    row_from: Callable[..., dict[str, Any]],
+    rows_from: Callable[[Any], list[dict[str, Any]]],
     *,
     made: "Made",
     problems: list[Problem],
     progress: Any,
     quick: bool,
 ) -> Counter[str]:
-    """Run groups, and add a row for each outcome; return what came of their cells."""
+    """Run groups, and add the rows of each outcome; return what came of their cells."""
     from reports.cluster.connect import connected
     from reports.cluster.run import run_groups
 
     counts, written = Counter[str](), time.monotonic()
     if not groups:
         return counts
-    total = sum(len(group.tasks) for group in groups)
+    total = sum(len(_cells(task)) for group in groups for task in group.tasks)
     with connected(place, quick=quick) as cluster, telling(progress, f"sweep {study.name}") as tell:
         for outcome in run_groups(cluster, groups, made=made, retries=study.retries):
-            key, cell = outcome.task.name, outcome.task.arguments[0]
-            if outcome.status != "lost":
-                store.add(row_from(cell, key, outcome))
-            counts[outcome.status if outcome.status != "done" else store.status(key) or "done"] += 1
+            cells = _cells(outcome.task)
+            rows = [] if outcome.status == "lost" else rows_from(outcome)
+            for row in rows:
+                store.add(row)
+                counts[row["status"]] += 1
+            if not rows:
+                counts[outcome.status] += len(cells)
             if outcome.status not in ("done", "refused"):
-                problems.append(Problem(cell.scene, cell.chosen.label, outcome.status, outcome.reason))
+                what = cells[0].chosen.label if len(cells) == 1 else f"times of {len(cells)} methods"
+                problems.append(Problem(cells[0].scene, what, outcome.status, outcome.reason))
             if time.monotonic() - written > _EVERY:
                 store.write_parquet()
                 written = time.monotonic()
-            tell(counts.total() / total, f"{counts.total()} of {total} cells, {cell.scene}")
+            tell(counts.total() / total, f"{counts.total()} of {total} cells, {cells[0].scene}")
     return counts
+
+
+def _cells(task: "Task") -> "list[Cell]":
+    """Return the cells of a task: one that is rendered, or those of an image that are timed."""
+    first = task.arguments[0]
+    return list(first.values()) if isinstance(first, dict) else [first]

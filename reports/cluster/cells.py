@@ -3,7 +3,7 @@
 
 import io
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -26,8 +26,9 @@ from validation.study.keys import Made, cell_key, row_source
 from validation.study.reference import Reference, cell_reference, load_cell
 from validation.study.row import FRAME_MS, NO_REFERENCE, Origin, row_values
 from validation.study.rows import RowStore
-from validation.study.run import cell_row, render, run
+from validation.study.run import cell_row, run
 from validation.study.study import Cell, Study
+from validation.study.turns import time_cells
 
 _DONE = ("done", "refused", "left out")  #: what is not computed again
 _QUALITY = 60  # of WebP
@@ -53,30 +54,40 @@ def row_of(reference: Reference, cell: Cell, key: str) -> dict[str, Any]:
     return row_values(row)
 
 
-def times_of(cell: Cell) -> dict[str, Any]:
-    """Return the columns of a cell's times, of a worker that is alone on its host."""
+def times_of(cells: Mapping[str, Cell]) -> dict[str, dict[str, Any]]:
+    """Return the columns of the times of cells of one image, by their keys, of a worker that is alone on its host.
+
+    They are of one run, in which the cells take turns.
+    """
     from distributed import get_worker
 
-    done, _ = render(_opened(cell.image)[1], replace(cell, measure=replace(cell.measure, times="with")))
-    row = cell_row(cell, times=done.times, cost=done.cost and replace(done.cost, alone=is_alone(get_worker())))
-    values = {name: value for name, value in row_values(row).items() if value is not None}
-    return {name: value for name, value in values.items() if name.startswith(("times.", "cost."))}
+    image = next(iter(cells.values())).image
+    scene, alone = _opened(image)[1], is_alone(get_worker())
+    columns = {}
+    for (key, cell), timed in zip(cells.items(), time_cells(list(cells.values()), lambda cell: scene), strict=True):
+        values = row_values(cell_row(cell, times=timed.times))
+        columns[key] = {name: value for name, value in values.items() if name.startswith("times.")}
+        columns[key] |= {"cost.prepare_ms": timed.prepare_ms, "cost.alone": alone}
+    return columns
 
 
 def timing_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Iterator[Group]:
-    """Yield the tasks of the rows of a study that are timed alone, were done and have no times.
+    """Yield a task for each image of a study that is timed alone, if times are missing of rows that were done.
 
-    A task is named by the key of its row and begins its arguments with the cell, here and in `cell_groups`.
+    Then all cells of the image are timed: they are compared with one another.
     """
     for keyed in _keyed(study.timed_images(), made, scenes):
         wanted = {key: cell for key, cell in keyed.items() if store.status(key) == "done"}
-        missing = {key: cell for key, cell in wanted.items() if store.row(key)[FRAME_MS] is None}
-        if missing:
-            yield Group(tuple(Task(key, times_of, (cell,), study.limit, alone=True) for key, cell in missing.items()))
+        if any(store.row(key)[FRAME_MS] is None for key in wanted):
+            first = next(iter(wanted))
+            yield Group((Task(f"times, {first}", times_of, (wanted,), study.limit * len(wanted), alone=True),))
 
 
 def cell_groups(study: Study, made: Made, *, store: RowStore, scenes: dict[str, str]) -> Iterator[Group]:
-    """Yield the tasks of every image that lacks rows, or whose cells failed, hung or aborted."""
+    """Yield the tasks of every image that lacks rows, or whose cells failed, hung or aborted.
+
+    A task is named by the key of its row and begins its arguments with the cell.
+    """
     for keyed in _keyed(study.images(), made, scenes):
         missing = {key: cell for key, cell in keyed.items() if store.status(key) not in _DONE}
         if missing:

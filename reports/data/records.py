@@ -21,7 +21,7 @@ from validation.statistics.records import Agreement, MultipleScattering, Number
 from validation.study.row import Row
 from validation.timing import Scaling
 
-SCHEMA = "airlight-report/3"
+SCHEMA = "airlight-report/4"
 
 Size = tuple[int, int]  #: width and height [pixels]
 Files = Mapping[str, str]  #: names relative to the folder of the report, by what they are
@@ -79,7 +79,7 @@ class Claim:
         meaning="`reference` (whether an estimator confirms it), `left-out` (the fraction that single scattering "
         "leaves out), `image`, `failed` (values that are not finite or negative, shadow rays that disagree), "
         "`published` (the same in configurations that reproduce a paper with its errors: no failure), `refused`, "
-        "`growth`, or `not-measured`"
+        "`growth`, `times` (when they were measured, and whether the machine changed meanwhile), or `not-measured`"
     )
     text: str = column(meaning="the sentence")
     good: bool | None = column(meaning="the verdict; `null` for a fact or an undecided check", default=None)
@@ -109,9 +109,9 @@ class Method(Row):
     """The row of a method in a scene, or of an engine's image: its files, and when it was measured."""
 
     files: Files = column(meaning="`exr`, `picture`, `error` (a picture of the signed relative error)")
-    measured: str = column(meaning="date of the measurement")
+    measured: str = column(meaning="date of the image and its errors; that of its times is `times.run.started`")
     seconds: float = column(unit="s", meaning="that it took")
-    cached: bool = column(meaning="whether an earlier run made it")
+    cached: bool = column(meaning="whether an earlier run made the image and its errors")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The times of two reports compared, by the rules of `validation.statistics.noise`."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from reports.data.records import Report, Size
+from reports.tables.methods import runs_of
 from validation.statistics.noise import SHORTEST, Times, drift, least_ratio, slower_stages, spread
+from validation.timing import FrameTimes
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,7 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> tuple
     notes = [Finding("note", "", "", change) for change in changes]
     if tolerance is None:
         return TimeComparison(0, machine, changes, 1.0, 1.0, 1.0), notes
-    if new.cached:
-        notes.append(Finding("note", "", "", f"{new.cached} results of the new report were measured earlier and kept"))
+    notes += [*_changed("old", old), *_changed("new", new)]
     pairs, otherwise = _pairs(old, new)
     notes += otherwise
     both = max(spread(_all_times(old)), spread(_all_times(new)))
@@ -67,6 +69,17 @@ def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:
     return same, tuple(changes)
 
 
+def _changed(which: str, report: Report) -> Iterator[Finding]:
+    """Yield a note on each scene during whose run the machine changed."""
+    for scene in report.scenes:
+        for run in runs_of(scene.methods):
+            if run.steady is False:
+                words = (
+                    f"the machine changed while the times of the {which} report were measured, {run.started} (factor)"
+                )
+                yield Finding("note", scene.name, "", words, run.within, run.between)
+
+
 Key = tuple[str, str]  # scene and label
 
 
@@ -77,6 +90,10 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
     notes: dict[Finding, None] = {}
     for key in [key for key in before if key in after]:
         (size, note, old_times), (new_size, new_note, new_times) = before[key], after[key]
+        run = new_times.run
+        if run is not None and run == old_times.run:
+            notes[Finding("note", key[0], "", f"times not compared: both reports show the run of {run.started}")] = None
+            continue
         if size != new_size:
             sizes = " and ".join("x".join(map(str, pixels)) for pixels in (size, new_size))
             notes[Finding("note", key[0], "", f"times not compared: the frames timed are {sizes} pixels")] = None
@@ -85,14 +102,14 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
                 Finding("note", *key, f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now")
             ] = None
         else:
-            pairs[key] = old_times, new_times
+            pairs[key] = old_times.measured, new_times.measured
     return pairs, list(notes)
 
 
-def _timed(report: Report) -> dict[Key, tuple[Size, str | None, Times]]:
+def _timed(report: Report) -> dict[Key, tuple[Size, str | None, FrameTimes]]:
     """Return the size of the frames that were timed, the device or the note on how, and times, by scene and label."""
     return {
-        (scene.name, entry.label): (scene.timed, entry.device or entry.note, entry.times.measured)
+        (scene.name, entry.label): (scene.timed, entry.device or entry.note, entry.times)
         for scene in report.scenes
         for entry in scene.methods
         if entry.times
@@ -100,7 +117,7 @@ def _timed(report: Report) -> dict[Key, tuple[Size, str | None, Times]]:
 
 
 def _all_times(report: Report) -> list[Times]:
-    return [times for _, _, times in _timed(report).values()]
+    return [times.measured for _, _, times in _timed(report).values()]
 
 
 def _drift(common: float, least: float, machine: bool, count: int) -> list[Finding]:

@@ -3,25 +3,27 @@
 whose kernels are to compile quickly.
 
 The caller sends the name of one of our functions with arguments that name scenes and methods; the process imports the
-user's code and sends back the result of the function. Its prints go to the error stream, so that they do not mix with
-the command's output. The process leads a group, so that all that the user's code started ends with it; it ends with its
-caller, however the caller ends.
+user's code and sends back the result of the function, or one after the other the values that it yields. Its prints go
+to the error stream, so that they do not mix with the command's output. The process leads a group, so that all that the
+user's code started ends with it; it ends with its caller, however the caller ends.
 """
 
 import math
 import os
-import pickle
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from typing import Any
 
 from analytic.errors import InputError
 from realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
+from reference.storage.kept import add_spent
 from reports.machine import quick_compilation
 from reports.machine.environment import child_environment
 
@@ -41,42 +43,65 @@ def in_own_process(
 ) -> Any:
     """Call a function in a new process; return what it returns, raise what it raises.
 
-    The variant is the current one by default.
+    What a function yields is yielded here: the process goes on to the next value when that is asked for, and ends with
+    the last one, or when the iterator that is returned here is closed. The variant is the current one by default.
 
     The function is at the top of a module of ours and prints nothing on the output; arguments and result are pickled.
-    `what` and `name` name the work in messages. After `limit` [s] the process is ended: math.inf is never, None what
-    the environment says of user methods. `quick` compiles kernels quickly: nothing is timed. EndedError says that the
-    process ended without an answer, or not in time.
+    `what` and `name` name the work in messages. If it takes longer than `limit` [s] to the result, or to a value that
+    it yields, the process is ended: math.inf is never, None what the environment says of user methods. `quick` compiles
+    kernels quickly: nothing is timed. EndedError says that the process ended without an answer, or not in time.
     """
-    seconds = method_limit() if limit is None else limit
+    environment = child_environment(variant) | (quick_compilation.settings() if quick else {})
+    answers = _answers(function, arguments, f"{what} {name}", limit, environment)
+    if next(answers):
+        return answers
+    value = next(answers)
+    answers.close()
+    return value
+
+
+def _answers(
+    function: Callable[..., Any], arguments: tuple[Any, ...], who: str, limit: float | None, environment: dict[str, str]
+) -> Generator[Any, None, None]:
+    """Yield whether a function in a new process yields values; then these values, or the one that it returns."""
+    seconds, yields = method_limit() if limit is None else limit, False
+    here, there = Pipe()
     # -P: modules of ours come before those of the user's folder.
     with subprocess.Popen(
-        [sys.executable, "-P", "-m", "reports.machine.own_process", str(os.getpid())],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env=child_environment(variant) | (quick_compilation.settings() if quick else {}),
+        [sys.executable, "-P", "-m", "reports.machine.own_process", str(os.getpid()), str(there.fileno())],
+        stdin=subprocess.DEVNULL,
+        stdout=2,  # what the user's code prints
+        env=environment,
+        pass_fds=[there.fileno()],
         start_new_session=True,
     ) as process:
+        there.close()
         try:
-            answer, _ = process.communicate(
-                pickle.dumps((sys.argv, function, arguments)), None if seconds == math.inf else seconds
-            )
-        except subprocess.TimeoutExpired:
-            hint = "" if limit else f"; {LIMIT_VARIABLE}={2 * seconds:g} allows more"
-            raise EndedError(f"{what} {name}: did not end within {seconds:g} s and was stopped{hint}") from None
+            here.send((sys.argv, function, arguments))
+            while True:
+                if not here.poll(None if seconds == math.inf else seconds):
+                    hint = "" if limit else f"; {LIMIT_VARIABLE}={2 * seconds:g} allows more"
+                    raise EndedError(f"{who}: did not end within {seconds:g} s and was stopped{hint}")
+                kind, value, loaded = here.recv()
+                if kind == "raised":
+                    raise value
+                add_spent(loaded)
+                if kind == "ended":
+                    return
+                if kind == "yields":
+                    yields = True
+                    yield True
+                else:
+                    if not yields:
+                        yield False
+                    yield value
+                here.send(None)  # go on
+        except (EOFError, ConnectionError):
+            how = _how(process.wait())
+            raise EndedError(f"{who}: ended its process, {how}; expected a result or an exception") from None
         finally:
+            here.close()
             _end(process)
-    if not answer:
-        how = _how(process.returncode)
-        raise EndedError(f"{what} {name}: ended its process, {how}; expected a result or an exception")
-    returned, value, loaded = pickle.loads(answer)
-    if not returned:
-        raise value
-    if loaded is not None:
-        from reference.storage.kept import add_spent
-
-        add_spent(loaded)
-    return value
 
 
 def _end(process: subprocess.Popen) -> None:
@@ -100,9 +125,7 @@ def _how(status: int) -> str:
 def main() -> None:
     """Do the task that the input holds, and write the answer to the output."""
     threading.Thread(target=_follow, args=(int(sys.argv[1]),), daemon=True).start()
-    output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what is printed
-    task = sys.stdin.buffer.read()
+    caller = Connection(int(sys.argv[2]))
     from reports.machine.environment import MissingError, activate
 
     activate()
@@ -111,15 +134,27 @@ def main() -> None:
     from reference.storage.kept import loaded_spent
 
     # The user's module sees the command line of the command.
-    sys.argv, function, arguments = pickle.loads(task)
-    answer: tuple[bool, Any, Any]
+    sys.argv, function, arguments = caller.recv()
+
+    def answer(kind: str, value: Any) -> None:
+        sys.stdout.flush()
+        caller.send((kind, value, loaded_spent() - answered[0]))
+        answered[0] = loaded_spent()
+
+    answered = [loaded_spent()]
     try:
-        answer = True, function(*arguments), loaded_spent()
+        result = function(*arguments)
+        if isinstance(result, Iterator):
+            answer("yields", None)
+            for value in result:
+                caller.recv()
+                answer("value", value)
+            caller.recv()
+            answer("ended", None)
+        else:
+            answer("value", result)
     except (InputError, MethodError, MissingError, NoDriverError) as error:
-        answer = False, type(error)(str(error)), None  # its cause may not be one that can be sent
-    sys.stdout.flush()
-    output.write(pickle.dumps(answer))
-    output.close()
+        answer("raised", type(error)(str(error)))  # its cause may not be one that can be sent
     _end_group()  # not waiting for what the user's code has started
 
 

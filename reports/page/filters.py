@@ -10,7 +10,7 @@ from reports.data.records import Report, Scene
 from reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
 from reports.tables.costs import scaling_tables, stability_summary
 from reports.tables.drawing import DASH, html, sentence_in_html, typeset
-from reports.tables.methods import fastest_table, method_row, methods_table, published_as
+from reports.tables.methods import fastest_table, method_row, methods_table, published_as, times_words
 from reports.tables.papers import paper_tables
 from reports.tables.table import Column, Row, Table, table
 from reports.tables.table import number as plain_number
@@ -25,6 +25,7 @@ KINDS = {
     "published": "Published peer",
     "refused": "Refused",
     "growth": "As the work grows",
+    "times": "Times",
     "not-measured": "Not measured",
 }
 #: By whether a claim is good: a mark, and its words for screen readers.
@@ -120,8 +121,8 @@ def methods(scene: Scene) -> Table:
         f"Times at {words(scene.timed)} pixels, medians, below those of a frame their quartiles; errors at "
         f"{words(scene.size)} pixels, of the airlight against the reference, or of all light where an image has no "
         "layers (total). A method that knows no shadows is marked; its error is then the light that shadows take away. "
-        "Published peers, at the end, are papers as printed: their errors are theirs."
-    )
+        "Published peers, at the end, are papers as printed: their errors are theirs. "
+    ) + times_words(scene.methods)
     rows = map(row, sorted(scene.methods, key=lambda entry: bool(published_as(entry))))
     return methods_table(f"Times and errors of the methods in {scene.name}", rows, *_METHODS, explanation=explanation)
 

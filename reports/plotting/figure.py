@@ -108,6 +108,7 @@ def speed_panel(
     """Draw times of frames, with quartiles, against errors of methods that have both; return their points by label.
 
     For a method that draws random numbers a bar goes down from its error to its bias, or to the largest possible bias.
+    A time that another program measured is hollow, and says so: it is of another run than the others.
     """
     points = {}
     for entry in filter(has_point, entries):
@@ -122,6 +123,9 @@ def speed_panel(
             bias = noise.most_bias if noise.root_bias is None else noise.root_bias
             if bias is not None:
                 style["yerr"] = [[max(error - bias, 0.0)], [0.0]]
+        if entry.times.run is None:
+            style["markerfacecolor"] = "none"
+            panel.annotate("timed elsewhere", (frame.median_ms, error), (0, 5), textcoords="offset points", fontsize=5)
         points[entry.label] = panel.errorbar([frame.median_ms], [error], xerr=spread, **style).lines[0]
     panel.set(xscale="log", yscale="log", xlabel="time of a frame [ms]")
     panel.set_title(title, parse_math=False)  # a dollar in a file name must not begin a formula

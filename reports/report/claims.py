@@ -9,6 +9,7 @@ The kinds of claims:
     failed         values that are not finite or negative, lit intervals on which shadow rays disagree
     published      values that are negative or not finite in what reproduces a paper, errors included: no failures
     refused        which method refuses which scene
+    times          when times were measured, and whether the machine changed meanwhile
     growth         whether a time jumps as the work grows
     not-measured   what was left out for its time, HDR-FLIP that could not be computed
 """
@@ -19,7 +20,7 @@ from realtime.methods.shader.source import is_users
 from reports.data.records import Claim, Scene
 from reports.tables.agreement import margin_words, verdict, worst_interval
 from reports.tables.costs import WORK, cliffs
-from reports.tables.methods import published_as
+from reports.tables.methods import published_as, runs_of
 from validation.metrics.errors import known
 from validation.statistics.records import Agreement
 from validation.study.row import Row
@@ -41,7 +42,7 @@ def claims(scenes: Scenes) -> list[Claim]:
         named = [f"{m.label} in {name}" for name, m in without]
         if named:
             sentences.append(_claim(kind, f"{words}, with the reason in the tables: {'; '.join(named)}."))
-    return sentences + _without_flip(scenes)
+    return sentences + _without_flip(scenes) + _timed(scenes)
 
 
 def unstudied(names: Sequence[str], known: Sequence[str]) -> list[Claim]:
@@ -161,6 +162,26 @@ def _failed(scenes: Scenes) -> Iterator[Claim]:
     if left:
         text = f"Random shadow rays disagree with lit intervals, and were not resolved: {'; '.join(left)} of them."
         yield _claim("failed", text + " They are counted in the error of the reference.", False)
+
+
+def _timed(scenes: Scenes) -> list[Claim]:
+    """Return a claim on the runs in which times were measured, if any were."""
+    runs = [(scene.name, run) for scene in scenes for run in runs_of(scene.methods)]
+    if not runs:
+        return []
+    dates = sorted(run.started for _, run in runs)
+    when = dates[0] if dates[0] == dates[-1] else f"between {dates[0]} and {dates[-1]}"
+    text = f"The times of a scene are of one run, in which its methods took turns: {when}."
+    changed = [
+        f"{name} ({run.between:.2f} times between rounds, {run.within:.2f} within one)"
+        for name, run in runs
+        if run.steady is False
+    ]
+    if changed:
+        text += (
+            f" The machine changed meanwhile, so that ratios count there, and no milliseconds: {', '.join(changed)}."
+        )
+    return [_claim("times", text)]
 
 
 def _pixels(scene: str, m: Row, count: str) -> str:

@@ -36,9 +36,10 @@ from validation.columns import record_of
 from validation.scenes.loading import scene_stem
 from validation.scenes.registry import FOG_SCENES
 from validation.study.configuration import Configuration
-from validation.study.run import PROBE, Apart, frame_of
+from validation.study.run import PROBE, frame_of
 from validation.study.scene import SceneStudy, open_scene, study_scene
 from validation.study.study import STUDIES, Cell, Study, standard_study
+from validation.study.turns import Apart
 
 if TYPE_CHECKING:
     from reports.cluster.connect import Client

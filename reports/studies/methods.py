@@ -153,23 +153,39 @@ def methods(
     True
     """
     from reports.api.render import asked_configurations
+    from reports.machine.own_process import in_own_process
     from reports.report.claims import own_faults
-    from reports.tables.methods import methods_table
+    from reports.tables.methods import methods_table, times_words
+    from validation.study.run import with_times
     from validation.study.scene import configurations_for
-    from validation.study.study import Measure
+    from validation.study.study import Cell, Measure
+    from validation.study.turns import time_cells
 
     chosen, apart = asked_configurations(method, kernel, settings)
     loaded = loaded_scenes(scenes, size)
     check_study("methods", loaded, chosen, progress=progress)
     tables, wrong, rows = [], [], []
     for scene, tell in scene_by_scene(loaded, "methods", progress):
-        read, _, cell = cells_of(scene, Measure("stages", seconds, every_metric=False), apart=apart)
-        useful, found = configurations_for(read.features, chosen), []
+        measure = Measure("stages", seconds, every_metric=False)
+        read, _, cell = cells_of(scene, measure, apart=apart)
+        useful, measured = configurations_for(read.features, chosen), list[tuple[CellRow, Any]]()
         for at, each in enumerate(useful):
-            tell(at / len(useful), each.label)
-            found.append(replace(cell(each)[0], scene=scene.name))
+            tell(0.5 * at / len(useful), each.label)
+            measured.append(cell(each))
+        # What was rendered is timed, all in turns.
+        path = str(scene.path or scene.name)
+        asked = [
+            Cell(path, scene.size, (), each, measure) if row.status == "done" else None
+            for each, (row, _) in zip(useful, measured, strict=True)
+        ]
+        tell(0.5, "times")
+        timings = time_cells(asked, partial(_same, read), apart=in_own_process if apart else None)
+        found = [
+            replace(with_times(row, times), scene=scene.name) for (row, _), times in zip(measured, timings, strict=True)
+        ]
         rows += found
-        tables.append(methods_table("{}, {} x {}".format(scene.name, *scene.size), found))
+        title = "{}, {} x {}".format(scene.name, *scene.size)
+        tables.append(methods_table(title, found, explanation=times_words(found)))
         wrong += own_faults(found)
     return MethodsStudy(
         name="methods",
@@ -178,6 +194,11 @@ def methods(
         rows=tuple(rows),
         faults=tuple(dict.fromkeys(wrong)),
     )
+
+
+def _same(scene: Any, cell: Any) -> Any:
+    """Return the scene of every cell."""
+    return scene
 
 
 # Errors by cause

@@ -255,14 +255,21 @@ def _quantiles(errors: Numbers) -> tuple[Quantile, ...]:
 def comparable_times(sweep: Sweep) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
     """Return which rows have times that may be compared with one another.
 
-    Those that were taken while nothing else of the sweep ran on the host, on the host, device and threads that have the
-    most such rows.
+    Those that were taken in turns while nothing else of the sweep ran on the host, on the host, device and threads that
+    have the most such rows; and of one image those of its last run.
     """
     hosts, devices = sweep["origin.host"], sweep["origin.device"]
     places = list(zip(hosts, devices, np.nan_to_num(sweep["origin.threads"]).tolist()))
-    alone = sweep["cost.alone"] == 1
+    alone = (sweep["cost.alone"] == 1) & (sweep["times.run.rounds"] > 1)
     most = Counter(place for place, timed in zip(places, alone) if timed).most_common(1)
-    return alone & np.array([bool(most) and place == most[0][0] for place in places], dtype=bool)
+    counts = alone & np.array([bool(most) and place == most[0][0] for place in places], dtype=bool)
+    # The dates of one host are in order as text.
+    images = list(zip(*(sweep[name].tolist() for name in ("scene", "width", "height", "medium"))))
+    last: dict[tuple[Any, ...], str] = {}
+    for row in np.flatnonzero(counts):
+        last[images[row]] = max(last.get(images[row], ""), sweep["times.run.started"][row] or "")
+    started = sweep["times.run.started"]
+    return counts & np.array([(when or "") == last.get(image) for image, when in zip(images, started)], dtype=bool)
 
 
 def errors_of(sweep: Sweep) -> Numbers:

@@ -76,8 +76,8 @@ def speed_table(said: Summary) -> Table:
         rows.append(row)
     none = ", ".join(f"{each.none} within {written(each.target)}" for each in said.fastest)
     explanation = (
-        f"Of {said.fastest[0].scenes} scenes in which every image was timed with the machine to itself; scenes in "
-        f"which no method is within the error: {none}."
+        f"Of {said.fastest[0].scenes} scenes in which every image was timed with the machine to itself, its methods in "
+        f"turns, in one run; scenes in which no method is within the error: {none}."
     )
     return table("Times, and the fastest method within an error", columns, rows, explanation=explanation)
 

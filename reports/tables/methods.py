@@ -23,10 +23,10 @@ from reports.tables.table import (
 )
 from validation.metrics.errors import Metrics
 from validation.study.row import Row as CellRow
-from validation.timing import FrameTimes, Timing
+from validation.timing import FrameTimes, Timing, TimingRun
 
 #: Times of a frame, by their names in report.json.
-TIMES = tuple(each.name for each in fields(FrameTimes))
+TIMES = tuple(each.name for each in fields(FrameTimes) if each.name != "run")
 ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite")
 
 COLUMNS = {
@@ -71,6 +71,7 @@ def method_row(entry: CellRow, *, shadows: bool = False) -> Row:
     if shadows and entry.kind != "image" and not entry.knows_shadows:
         remarks.append("no shadows")
     remarks += [entry.note] if entry.note else []
+    remarks += ["timed elsewhere"] if entry.times and entry.times.run is None else []
     values: dict[str, Value] = {"label": entry.label}
     if entry.reason:
         return Row(values, f"{entry.status}: {entry.reason}", tuple(remarks))
@@ -79,6 +80,39 @@ def method_row(entry: CellRow, *, shadows: bool = False) -> Row:
     values |= {name: getattr(entry.error, name, None) for name in ERRORS}
     values |= {"device": entry.device, "memory": entry.memory, "flip": entry.flip.value if entry.flip else None}
     return Row(values, remarks=tuple(remarks))
+
+
+def runs_of(entries: Iterable[CellRow]) -> list[TimingRun]:
+    """Return the runs in which the times of rows were measured, each once; those of other programs have none."""
+    return list(dict.fromkeys(entry.times.run for entry in entries if entry.times and entry.times.run))
+
+
+def run_words(run: TimingRun) -> str:
+    """Say when times were measured, and whether the machine changed meanwhile."""
+    words = f"measured in turns in one run of {run.rounds} rounds, {run.started}"
+    if run.steady is None or run.between is None or run.within is None:
+        return words
+    verdict = "stayed as it was" if run.steady else "CHANGED meanwhile: compare ratios, not milliseconds"
+    return (
+        f"{words}; the machine {verdict} (the anchor, camera rays alone: medians within a factor of {run.between:.2f} "
+        f"over the run, quartiles of {run.within:.2f} in a round)"
+    )
+
+
+def times_words(entries: Iterable[CellRow]) -> str:
+    """Say of what runs the times of a table are; empty where there are none."""
+    entries = list(entries)
+    runs = runs_of(entries)
+    if len(runs) == 1:
+        sentences = [f"Times: {run_words(runs[0])}."]
+    else:
+        sentences = [
+            f"Times of {', '.join(e.label for e in entries if e.times and e.times.run == run)}: {run_words(run)}."
+            for run in runs
+        ]
+    if any(entry.times and entry.times.run is None for entry in entries):
+        sentences.append("What is marked `timed elsewhere` is of another run, on another machine or by other rules.")
+    return " ".join(sentences)
 
 
 def per_second(time: Timing | None) -> float | None:
@@ -94,12 +128,14 @@ def rate_words(milliseconds: float) -> str:
 def fastest_within(error: float, entries: Iterable[CellRow]) -> tuple[CellRow, float] | None:
     """Return the row of the fastest frame [ms] among those with at most a relative RMSE; None where there is none.
 
-    Shaders run on another device, and are in no race with others. Pixels that are not finite are left out of the RMSE:
-    a method that has any must not win by it.
+    Shaders run on another device, and engines in a run of their own: both are in no race with others. Pixels that are
+    not finite are left out of the RMSE: a method that has any must not win by it.
     """
 
     def reaches(entry: CellRow) -> bool:
         if entry.device or entry.error is None or entry.error.relative_rmse is None:
+            return False
+        if entry.times is None or entry.times.run is None:
             return False
         return entry.error.relative_rmse <= error and not entry.error.nonfinite
 
@@ -117,7 +153,10 @@ def fastest_table(scenes: Iterable[Scene], *, code: bool = False) -> Table:
         )
         for scene in scenes
     )
-    explanation = "Relative RMSE of the airlight; median time of a frame with static geometry."
+    explanation = (
+        "Relative RMSE of the airlight; median time of a frame with static geometry. The times of a scene are of one "
+        "run."
+    )
     return table("The fastest method within an error", (*words("scene"), *columns), rows, explanation=explanation)
 
 

@@ -20,6 +20,7 @@ from validation.statistics.records import Statistics
 LABELS = ("unshadowed (exact)", "ray-march (steps=100)", "shadow-planes (exact)", "light-volumes (exact)")
 SCENES = ("fog", "hall", "pens")
 WHEN = "2026-11-21 12:00:00 +0000"
+RUN = {"started": WHEN, "rounds": 5, "anchor": None, "between": 1.01, "within": 1.02, "steady": True}
 
 _STAGES = {"surface": 0.3, "airlight": 0.7, "frame": 1.0, "light_moved": 1.4, "objects_moved": 1.9}  # of a frame's work
 
@@ -77,7 +78,7 @@ def entry(label: str, relative_rmse: float | None = 0.01, median: float = 2.0, *
     kernel = inside.rstrip(")").split(", ")[0]
     made = {"scene": "fog", "label": label, "method": name, "parameters": "{}", "width": 320, "height": 240}
     made |= {"kernel": kernel if kernel and "=" not in kernel else None, "status": "done", "files": {}}
-    made |= {"times": {stage: timing(fraction * median) for stage, fraction in _STAGES.items()}}
+    made |= {"times": {"run": RUN} | {stage: timing(fraction * median) for stage, fraction in _STAGES.items()}}
     made |= {"error": errors(relative_rmse), "measured": WHEN, "seconds": 1.5, "cached": False}
     return made | dict.fromkeys(("reason", "note", "surface_error", "flip")) | changes
 
@@ -157,7 +158,7 @@ def stable(kernel: str, *broken: str) -> dict[str, Any]:
 
 def report_of(scenes: list[dict[str, Any]], **changes: Any) -> dict[str, Any]:
     """Return the content of a report."""
-    made = {"schema": "airlight-report/3", "created": "2026-11-21 12:00:01 +0000", "command": "airlight report"}
+    made = {"schema": "airlight-report/4", "created": "2026-11-21 12:00:01 +0000", "command": "airlight report"}
     made |= {"seconds": 2.0, "parts": {"scenes": 2.0}, "cached": 0, "computed": 4}
     made |= {"measured": {"first": WHEN, "last": WHEN}, "settings": settings(), "environment": environment()}
     made |= {"claims": [{"kind": "reference", "text": "The reference is confirmed by volpath.", "good": True}]}
@@ -179,7 +180,7 @@ def times(frame_ms: float, rng: np.random.Generator | None = None, *, busy: floa
     Without a generator exact ones. A machine that is busy now and then, by the fraction `busy`, adds up to three times
     the work to whole timings, and to single repetitions of the others: both were seen.
     """
-    stages = {}
+    stages: dict[str, Any] = {"run": RUN | {"started": f"{WHEN}, {frame_ms}, {rng}"}}
     for stage, fraction in _STAGES.items():
         count = 40 if fraction <= 1 else 12
         samples = np.full(count, frame_ms * fraction)

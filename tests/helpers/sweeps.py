@@ -39,7 +39,9 @@ def row(scene="random:0", method="ray-march", kernel=None, parameters=None, **ch
     origin = {"host": "here", "device": "a processor", "variant": "llvm_ad_rgb", "threads": 2, "airlight": "0.1.0"}
     origin |= {"started": "2026-11-23T08:30:00Z", "mitsuba": "3.9.1", "drjit": "1.5.0", "python": "3.11.2"}
     reference = {"estimator": "quadrature", "error": 1e-7, "seconds": 0.5}
-    parts = {"error": error, "reference": reference, "times.frame": frame, "origin": origin, "cost": {"alone": True}}
+    run = {"started": "2026-11-23 08:31:00 +0000", "rounds": 5}
+    parts = {"error": error, "reference": reference, "times.frame": frame, "times.run": run, "origin": origin}
+    parts |= {"cost": {"alone": True}}
     values |= {f"{part}.{name}": value for part, own in parts.items() for name, value in own.items()}
     values["command"] = f"airlight compare {scene} --method {method}"
     values |= {column_of(name): value for name, value in changes.items()}
@@ -61,6 +63,8 @@ def column_of(name):
             "frame_ms_low": "times.frame.low_ms",
             "frame_ms_high": "times.frame.high_ms",
             "timed_alone": "cost.alone",
+            "timed": "times.run.started",
+            "rounds": "times.run.rounds",
             "reference": "reference.estimator",
             "reference_error": "reference.error",
             "surface_nonfinite": "surface_error.nonfinite",

@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from analytic.clock import Spent
 from analytic.errors import InputError
 from realtime.errors import InputError as RealtimeInputError
 from realtime.kernels.registry import KERNELS, Kernel
@@ -162,13 +163,14 @@ def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[
 def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[RayTime | None, RayTime]:
     """Return the time of the compiled kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
     whole = time_repeated(work, seconds=seconds)
-    times: list[float] = []
+    times: list[Spent] = []
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         for _ in range(max(5, min(whole.repetitions, 50))):
             work()
             dr.sync_thread()
-            times.append(sum(entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,))))
+            ms = sum(entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,)))
+            times.append(Spent(1e-3 * ms))
             dr.kernel_history_clear()
     scale = 1e6 / rays
     device, wall = (

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The times of a frame and of its stages, and of frames after light, objects or colours changed."""
+"""The times of a frame and of its stages, and of frames after light, objects or colours changed.
 
-from collections.abc import Callable
+A *turn* of a method renders its frames once; methods take turns (`validation.study.turns`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any
 
@@ -24,20 +28,15 @@ from realtime.frame.renderer import (
 )
 from realtime.frame.surface import cast_rays
 from realtime.methods.shader.method import drawn_again
+from realtime.numerics.array_types import aligned_array
 from realtime.numerics.recorded import Frozen
 from realtime.scene.animate import Objects, read_objects, turned_objects
-from realtime.scene.camera import ray_directions
+from realtime.scene.camera import ray_directions, tiled_pixels
 from realtime.scene.read_scene import Scene
-from validation.clock import time_repeated, timed, timing_of
-from validation.timing import FrameTimes, Timing
+from validation.clock import timed, timing_of
+from validation.timing import FrameTimes, TimingRun
 
-#: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
-#: or more frames would take minutes.
-SLOW = 8.0
-_BRIEF = 0.1  # on frames that are timed briefly, and as much on the airlight alone [s]
-_BRIEF_MOST = 9  # of these frames
-_BRIEF_SLOW = 500.0  # a slower one is timed once, without a warm-up of its own [ms]
-_TURNS = 1.5  # approximate time for the one to five frames that are timed stage by stage [s]
+_BRIEF_SLOW = 500.0  # of a slower frame the airlight is not timed by itself where times are brief [ms]
 
 
 def timed_image(renderer: FrameRenderer, scene: Scene, caches: tuple[FrameCache, ...] | None, **moved: bool):
@@ -65,15 +64,16 @@ def moved_light(renderer: FrameRenderer) -> Callable[[], Any]:
     return _step(renderer, None, light_moved=True)
 
 
-def camera_rays(renderer: FrameRenderer) -> Callable[[], Any]:
+def camera_rays(scene: Scene) -> Callable[[], Any]:
     """Return the work of casting the camera rays without shading, the least time of a frame that casts them."""
-    scene = renderer.scene
+    pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
+    dr.eval(pixel)
 
     @Frozen
     def cast(geometry, facets, pixel, camera):
         return cast_rays(geometry, facets, camera.origin, ray_directions(camera, pixel)[0]).distance
 
-    return lambda: dr.eval(cast(scene.geometry, scene.facets, renderer.pixel, scene.camera))
+    return lambda: dr.eval(cast(scene.geometry, scene.facets, pixel, scene.camera))
 
 
 def _step(renderer: FrameRenderer, cache: FrameCache | None, *, light_moved: bool) -> Callable[[], Any]:
@@ -87,117 +87,114 @@ def first_frame(renderer: FrameRenderer) -> FrameCache:
     return next_frame(renderer, renderer.scene, None, camera_moved=True, geometry_moved=True, light_moved=True)[1]
 
 
-def time_frame(
-    renderer: FrameRenderer, *, seconds: float = 0.6, slow: float | None = None, took: float | None = None
-) -> FrameTimes:
-    """Time the stages of a frame, the whole frame, and frames after light, objects or only colours changed.
+@dataclass(frozen=True)
+class FrameSpent:
+    """What the frames of one turn took, by the names of `FrameTimes`; None for what was not asked for."""
 
-    `seconds` are spent on each of the first three, and half as long on each of the others. If a frame takes longer than
-    `slow` with its preparation [s], `SLOW` by default, frames are run stage by stage and the seven times are added up
-    from the stages: up to five frames in place of some forty. The same holds for images that are rendered in parts.
-    `took` is the time of the last frame with its preparation, if one was rendered just before [s]; else two are.
-    """
-    if len(parts(renderer)) > 1:
-        return _slow_frame(renderer, turns=3)
-    scene = renderer.scene
-    if took is None:
-        first_frame(renderer)  # compiles and records
-        took = timed(lambda: first_frame(renderer))[1].seconds
-    if took > (SLOW if slow is None else slow):
-        return _slow_frame(renderer, turns=int(np.clip(_TURNS / took, 1, 5)))
-    cache = first_frame(renderer)
-    state, cast = cache.state, cache.cast
-    by_light = run_shade(renderer, cast)
-    dr.eval(cast, by_light)
-
-    objects = _objects(scene)
-
-    def objects_moved():
-        # Where they stand: the work is that of any other place.
-        there = turned_objects(scene, objects, np.eye(3)) if objects else scene
-        next_frame(renderer, there, None, camera_moved=False, geometry_moved=True, light_moved=True)
-
-    def few(work: Callable[[], Any]) -> Timing:
-        return time_repeated(work, seconds=0.5 * seconds, least=3)
-
-    return FrameTimes(
-        frame=time_repeated(lambda: run_stages(renderer, state), seconds=seconds),
-        surface=time_repeated(partial(_ready, run_cast_and_shade, renderer), seconds=seconds),
-        airlight=time_repeated(partial(_ready, run_method, renderer, state, cast, by_light), seconds=seconds),
-        light_moved=few(moved_light(renderer)),
-        objects_moved=few(objects_moved),
-        light_moved_camera_cached=few(_step(renderer, cache, light_moved=True)),
-        colours_changed=few(_step(renderer, cache, light_moved=False)),
-    )
+    frame: Spent
+    airlight: Spent
+    surface: Spent | None = None
+    light_moved: Spent | None = None
+    light_moved_camera_cached: Spent | None = None
+    colours_changed: Spent | None = None
+    prepare: Spent | None = None  #: for the state of the method, where it is timed by itself
 
 
-def brief_times(renderer: FrameRenderer) -> tuple[FrameTimes, float]:
-    """Time frames for a tenth of a second, and as long their airlight alone; return what a preparation takes too [ms].
-
-    The renderer has made a frame before, so that its kernels are compiled.
-    """
-    state, preparation = timed(lambda: renderer.prepare(renderer.scene))
-    frame = _brief(lambda: run_stages(renderer, state))
-    if frame.median_ms >= _BRIEF_SLOW:  # camera rays and surfaces take little of it, and it takes too long to ask
-        return FrameTimes(frame, frame), preparation.ms
-    cast, by_light = run_cast_and_shade(renderer)
-    dr.eval(cast, by_light)
-
-    def airlight():
-        return evaluated(cast, run_method(renderer, state, cast, by_light))
-
-    return FrameTimes(frame, _brief(airlight)), preparation.ms
+#: A turn of a method: its frames, each once; a shader draws several.
+Turn = Callable[[], list[FrameSpent]]
 
 
-def shader_times(renderer: FrameRenderer, seconds: float | None = None) -> tuple[str, FrameTimes]:
-    """Return the device that draws a shader, and the times of all its passes there for so many seconds, by default few.
+def whole_turn(renderer: FrameRenderer) -> Turn:
+    """Return a turn whose frames are timed as wholes, each by itself, with their two largest stages."""
+
+    def turn() -> list[FrameSpent]:
+        # What the method prepares on the host goes on while the device is busy with the surface: no sum of stages.
+        (_, cache), light_moved = timed(moved_light(renderer))
+        (cast, by_light), surface = timed(partial(_ready, run_cast_and_shade, renderer))
+        airlight = timed(partial(_ready, run_method, renderer, cache.state, cast, by_light))[1]
+        frame = timed(lambda: run_stages(renderer, cache.state))[1]
+        camera_cached = timed(_step(renderer, cache, light_moved=True))[1]
+        colours = timed(_step(renderer, cache, light_moved=False))[1]
+        return [FrameSpent(frame, airlight, surface, light_moved, camera_cached, colours)]
+
+    return turn
+
+
+def staged_turn(renderer: FrameRenderer) -> Turn:
+    """Return a turn of one frame, stage by stage, of which all frames are sums; large images are run in parts."""
+    in_parts, needed = parts(renderer), renderer.method.prepared_from
+
+    def turn() -> list[FrameSpent]:
+        state, prepare = timed(partial(renderer.prepare, renderer.scene))
+        surface, shade, airlight = Spent(), Spent(), Spent()
+        for part in in_parts:
+            (cast, by_light), spent = timed(partial(_ready, run_cast_and_shade, part))
+            surface += spent
+            shade += timed(partial(_ready, run_shade, part, cast))[1]
+            airlight += timed(partial(_ready, run_method, part, state, cast, by_light))[1]
+        frame, nothing = surface + airlight, Spent()
+        camera_cached = shade + airlight + (prepare if needed & {"light", "look"} else nothing)
+        colours = shade + airlight + (prepare if "look" in needed else nothing)
+        return [FrameSpent(frame, airlight, surface, prepare + frame, camera_cached, colours)]
+
+    return turn
+
+
+def brief_turn(renderer: FrameRenderer) -> Turn:
+    """Return a turn of one frame, with its airlight alone; of a long frame that is the frame."""
+
+    def turn() -> list[FrameSpent]:
+        state, prepare = timed(lambda: renderer.prepare(renderer.scene))
+        frame = timed(lambda: run_stages(renderer, state))[1]
+        if frame.ms >= _BRIEF_SLOW:  # camera rays and surfaces take little of it, and it takes too long to ask
+            return [FrameSpent(frame, frame, prepare=prepare)]
+        cast, by_light = run_cast_and_shade(renderer)
+        dr.eval(cast, by_light)
+        airlight = timed(lambda: evaluated(cast, run_method(renderer, state, cast, by_light)))[1]
+        return [FrameSpent(frame, airlight, prepare=prepare)]
+
+    return turn
+
+
+def shader_turn(renderer: FrameRenderer, seconds: float) -> tuple[str, Turn]:
+    """Return the device that draws a shader, and a turn of all its passes there for so many seconds.
 
     Transfers from and to the host are left out: an engine has its rays and its maps.
     """
     state = renderer.prepare(renderer.scene)
     run_stages(renderer, state)
-    device, times = drawn_again(state[0], _BRIEF if seconds is None else seconds)
-    timing = timing_of(times)
-    return device, FrameTimes(timing, timing)
+    device, _ = drawn_again(state[0], 0.0)  # warms up
+
+    def turn() -> list[FrameSpent]:
+        spent = (Spent(1e-3 * ms) for ms in drawn_again(state[0], seconds)[1])
+        return [FrameSpent(each, each) for each in spent]
+
+    return device, turn
 
 
-def _brief(work: Callable[[], Any]) -> Timing:
-    """Time some runs after one of warm-up; a slow one is not repeated."""
-    _, first = timed(work)
-    if first.ms >= _BRIEF_SLOW:
-        return timing_of([first.ms], cpu_ms=first.cpu_ms)
-    return time_repeated(work, seconds=_BRIEF, least=1, most=_BRIEF_MOST, warm_up=0)
+def object_moves(scene: Scene) -> Callable[[], Any] | None:
+    """Return the work of moving all objects of a scene, to where they stand; None where none can be moved.
+
+    The work is that of any other place, the same for all methods.
+    """
+    objects = _objects(scene)
+    return None if objects is None else partial(turned_objects, scene, objects, np.eye(3))
 
 
-def _slow_frame(renderer: FrameRenderer, *, turns: int) -> FrameTimes:
-    """Time the stages of some frames; objects are moved once, after a warm-up: no method changes what that takes."""
-    there, in_parts, move = renderer.scene, parts(renderer), Spent()
-    objects = _objects(there)
-    if objects:
-        for _ in range(2):
-            there, move = timed(lambda: turned_objects(renderer.scene, objects, np.eye(3)))
-    steps = []
-    for _ in range(turns):
-        state, prepare = timed(partial(renderer.prepare, there))
-        of_parts = np.zeros(3)
-        for part in in_parts:
-            (cast, by_light), surface = timed(partial(_ready, run_cast_and_shade, part))
-            shade = timed(partial(_ready, run_shade, part, cast))[1]
-            airlight = timed(partial(_ready, run_method, part, state, cast, by_light))[1]
-            of_parts += surface.ms, shade.ms, airlight.ms
-        steps.append([prepare.ms, *of_parts])
-    prepares, surfaces, shades, airlights = np.array(steps).T
-    needed = renderer.method.prepared_from
-    light_moved = prepares + surfaces + airlights
-    return FrameTimes(
-        frame=timing_of(surfaces + airlights),
-        surface=timing_of(surfaces),
-        airlight=timing_of(airlights),
-        light_moved=timing_of(light_moved),
-        objects_moved=timing_of(move.ms + light_moved),
-        light_moved_camera_cached=timing_of(shades + airlights + prepares * bool(needed & {"light", "look"})),
-        colours_changed=timing_of(shades + airlights + prepares * ("look" in needed)),
-    )
+def times_of(spent: Sequence[FrameSpent], moves: Sequence[Spent], run: TimingRun) -> FrameTimes:
+    """Return the times of the frames of all turns in a run; `moves`: what moving all objects took, if anybody asks."""
+    timings = {}
+    for each in fields(FrameSpent):
+        values = [value for value in (getattr(one, each.name) for one in spent) if value is not None]
+        if values and each.name != "prepare":
+            timings[each.name] = timing_of(values)
+    lights = [one.light_moved for one in spent if one.light_moved is not None]
+    if lights and moves:
+        move = sorted(moves, key=lambda one: one.seconds)[len(moves) // 2]
+        timings["objects_moved"] = timing_of([move + one for one in lights])
+    elif lights:
+        timings["objects_moved"] = timings["light_moved"]
+    return FrameTimes(**timings, run=run)
 
 
 def _ready(stage: Callable[..., Any], *given: Any) -> Any:

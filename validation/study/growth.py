@@ -51,14 +51,17 @@ from realtime.scene.lights import Light
 from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
 from realtime.scene.read_scene import Scene, read_scene
 from validation.arrays import Array, Counted
+from validation.clock import time_repeated
 from validation.columns import record_of
 from validation.scenes.loading import load_scene
 from validation.scenes.meshes import divided, rotation
 from validation.scenes.parts import mesh_with_material
-from validation.study.row import Row
-from validation.study.run import run
+from validation.study.frame_times import camera_rays
+from validation.study.row import Growth, Row
+from validation.study.run import run, with_times
 from validation.study.study import GROWTH, Cell, Study
-from validation.timing import Scaling, TimeGrowth
+from validation.study.turns import time_cells
+from validation.timing import Scaling, TimeGrowth, TimingRun, joined
 
 TIMES = ("frame", "light_moved", "objects_moved")
 CLIFF = 0.6  #: steeper than the exponent by so much: 4 times the work then takes 2.3 times as long as it may
@@ -209,19 +212,33 @@ def _is_cut(shape) -> bool:
 def study_growth(study: Study, kind: str, steps: Sequence[Step], *, progress: Counted | None = None) -> list[Scaling]:
     """Measure how methods grow with a kind of work, in steps of `ladder`, in the first scene.
 
-    A method ends at the first step that it refuses.
+    Methods take turns in each step; steps follow one another, as their scenes are too large to be loaded together. The
+    anchor of all steps says whether the machine changed between them. A method ends at the first step that it refuses.
     """
-    name, rows = study.scenes[0], list[list[Row]]([] for _ in study.configurations)
+    name, rows, runs = study.scenes[0], list[list[Row]]([] for _ in study.configurations), list[TimingRun]()
+    anchor: Callable[[], Any] | None = None
     for number, step in enumerate(steps):
         scene = step.scene()
+        # Steps are compared with one another: the camera rays of the first are the anchor of all.
+        anchor = anchor or camera_rays(scene)
         size = scene.camera.width, scene.camera.height
+        cells: list[Cell | None] = []
         for place, (chosen, own) in enumerate(zip(study.configurations, rows, strict=True)):
+            cell = None
             if all(row.status == "done" for row in own):
                 asked = replace(chosen, parameters=tuple((dict(chosen.parameters) | dict(step.parameters)).items()))
-                own.append(run(Cell(name, size, (), asked, study.measure, (kind, step.work)), scene, None)[0])
+                cell = Cell(name, size, (), asked, study.measure, (kind, step.work))
+                own.append(run(cell, scene, None)[0])
+            cells.append(cell if cell is not None and own[-1].status == "done" else None)
             if progress is not None:
                 done = number * len(rows) + place + 1
                 progress(done, len(steps) * len(rows), f"{kind} {step.work:g}, {chosen.label}")
+        timings = time_cells(cells, partial(_same, scene), anchor=anchor)
+        rays = time_repeated(camera_rays(scene), seconds=0.5 * study.measure.seconds, least=3)
+        for own, cell, timed in zip(rows, cells, timings, strict=True):
+            if cell is not None:
+                own[-1] = replace(with_times(own[-1], timed), work=Growth(kind, step.work, rays))
+        runs += [each.times.run for each in timings if each.times is not None and each.times.run is not None][:1]
     found = []
     for chosen, own in zip(study.configurations, rows):
         costs: list[dict[str, Any]] = [
@@ -239,9 +256,14 @@ def study_growth(study: Study, kind: str, steps: Sequence[Step], *, progress: Co
             "costs": costs,
             "growth": {each: growth(kind, each, works, values) for each, values in times.items()},
             "refused": own[-1].reason,
+            "run": joined(runs) if runs else None,
         }
         found.append(record_of(scaling, Scaling))
     return found
+
+
+def _same(scene: Scene, cell: Cell) -> Scene:
+    return scene
 
 
 def growth(kind: str, name: str, works: Sequence[float], times: Sequence[float]) -> TimeGrowth:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A cell becomes a row: its image is rendered, timed and compared with the reference. Nothing else does all three.
+"""A cell becomes a row: its image is rendered and compared with the reference.
+
+Its times belong to a run of all that it is compared with (`validation.study.turns`); only where they need not be
+compared, as of sweeps whose cells are timed while others run, they are taken here.
 
 A method that refuses a scene gives a row too, with its reason, and so does one that would take too long. Other
 exceptions are the caller's: they are faults. Nothing here knows where it runs.
@@ -19,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.clock import stopwatch
-from analytic.errors import InputError as ReferenceInputError
 from realtime.errors import InputError
 from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame, run_stages, unchecked_frame
 from realtime.methods.interface.method import method_parameters
@@ -27,7 +29,7 @@ from realtime.methods.registry import find_method
 from realtime.methods.shader.source import is_shader
 from realtime.scene.read_scene import Scene, read_scene
 from reference.storage.exr import Image
-from validation.clock import peak_memory, time_repeated, timed
+from validation.clock import timed
 from validation.metrics.colour import colour_difference
 from validation.metrics.errors import FLOOR, error_metrics
 from validation.metrics.flip import flip_hdr
@@ -36,24 +38,19 @@ from validation.motion.blocks import parts_of_error
 from validation.statistics.estimate import Answer
 from validation.statistics.samples import first_equal, student
 from validation.study.configuration import Configuration, prepared, rendered_lights
-from validation.study.frame_times import brief_times, camera_rays, shader_times, time_frame
 from validation.study.reference import Reference, load_cell
 from validation.study.row import Cost, Growth, Row, RunsError, StatedError
 from validation.study.stated_errors import stated_bound, worth_of_ends
 from validation.study.study import Cell, map_side, seed_of
+from validation.study.turns import REFUSALS, Apart, CellTimes, brief_times
 
 Array = NDArray[np.float64]
-#: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``.
-Apart = Callable[..., Any]
 #: Makes a picture of reference and image, both (height, width, 3) [W/(m^2 sr)]; None where there is none.
 Paint = Callable[[Array, Array], bytes | None]
 
-REFUSALS = (InputError, ReferenceInputError)  #: what methods and readers of scenes raise for what they cannot do
 RUNS = 8  #: of a method that draws random numbers
 PROBE = (64, 48)  #: size of the frame from which the time of a full-size frame is estimated [pixels]
 _DOUBTFUL = 0.5  # fraction of the limit: after a longer preparation, the time of a frame is estimated before it begins
-_RECORDED = 1.0  # in a first frame that takes less, its recording takes a part of time and memory that counts [s]
-_LONG = 25.0  # after a longer first frame, compilation included, no larger frame is timed [s]
 
 
 def run(
@@ -61,17 +58,15 @@ def run(
     scene: Scene,
     reference: Reference | None,
     *,
-    timed_scene: Scene | None = None,
     whole: Any = None,
     paint: Paint | None = None,
     apart: Apart | None = None,
 ) -> tuple[Row, Frame | None]:
-    """Render, time and compare a cell.
+    """Render and compare a cell, and time it where its times are taken 'with' its errors.
 
-    Scene and reference are of the same image, at the size of the cell; without a reference nothing is compared. Frames
-    are timed in `timed_scene` where that is given. `whole` is the `mi.Scene` that both were read from: without it no
-    error is held against what the method states. `paint` makes the picture of the row, and `apart` calls a user's
-    method in a separate process. The row lacks what only the caller knows: key, study, origin.
+    Scene and reference are of the same image, at the size of the cell; without a reference nothing is compared.
+    `whole` is the `mi.Scene` that both were read from: without it no error is held against what the method states.
+    `paint` makes the picture of the row, and `apart` calls a user's method in a separate process.
     """
     took = stopwatch()
     runs: list[Array] = []
@@ -79,7 +74,7 @@ def run(
         if apart is not None and cell.chosen.own:
             row, frame, runs = apart(render_cell, cell, name=cell.chosen.method)
         else:
-            row, frame = render(scene, cell, timed_scene=timed_scene)
+            row, frame = render(scene, cell)
             runs = [] if frame is None or reference is None else _other_runs(scene, cell)
     except REFUSALS as error:
         row, frame = cell_row(cell, status="refused", reason=str(error)), None
@@ -127,18 +122,14 @@ def cell_row(cell: Cell, **outcome: Any) -> Row:
 
 
 def render_cell(cell: Cell) -> tuple[Row, Frame | None, list[Array]]:
-    """Render and time a cell in a process that has loaded nothing; return the airlight of its other runs too."""
-    larger = cell.measure.timed_size
-    timed_scene = None
-    if larger is not None and larger != cell.size:
-        timed_scene = read_scene(load_cell(replace(cell, size=larger)).scene)
+    """Render a cell in a process that has loaded nothing; return the airlight of its other runs too."""
     scene = read_scene(load_cell(cell).scene)
-    row, frame = render(scene, cell, timed_scene=timed_scene)
+    row, frame = render(scene, cell)
     return row, frame, [] if frame is None else _other_runs(scene, cell)
 
 
-def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tuple[Row, Frame | None]:
-    """Render and time a cell; return its row, not yet compared with anything, and its frame, if there is one."""
+def render(scene: Scene, cell: Cell) -> tuple[Row, Frame | None]:
+    """Render a cell; return its row, not yet compared with anything, and its frame, if there is one."""
     chosen, wanted = cell.chosen, cell.measure
     row_of = partial(cell_row, cell, knows_shadows=knows_shadows(chosen))
     dr.sync_thread()
@@ -156,37 +147,24 @@ def render(scene: Scene, cell: Cell, *, timed_scene: Scene | None = None) -> tup
     backend = dr.JitBackend.CUDA if (mi.variant() or "").startswith("cuda") else dr.JitBackend.LLVM
     watermark = int(dr.detail.malloc_watermark(backend))
     cost = Cost(making.ms + first.ms, None, after[0] - before[0], after[2] - before[2], watermark)
-    if is_shader(chosen.method):
-        shown = renderer if timed_scene is None or wanted.times == "with" else prepared(timed_scene, chosen)
-        seconds = wanted.seconds if wanted.times == "stages" else None
-        device, times = (None, None) if wanted.times == "none" else shader_times(shown, seconds)
-        return row_of(times=times, device=device, cost=cost), frame
-    if wanted.times == "with":
-        times, prepare = brief_times(renderer)
-        return row_of(times=times, cost=replace(cost, prepare_ms=prepare)), frame
-    if wanted.times != "stages":
-        return row_of(cost=cost), frame
-    notes = []
-    if timed_scene is not None and first.seconds > _LONG:
-        timed_scene = None
-        notes.append(f"timed at {scene.camera.width} x {scene.camera.height}: larger frames take minutes")
-    if chosen.own and not is_shader(chosen.method) and not find_method(chosen.method).frozen:
-        notes.append("not frozen: its Python runs again for every frame")
-    shown = renderer if timed_scene is None else prepared(timed_scene, chosen)
-    took: list[float] = []
+    note = None
+    if (
+        wanted.times == "stages"
+        and chosen.own
+        and not is_shader(chosen.method)
+        and not find_method(chosen.method).frozen
+    ):
+        note = "not frozen: its Python runs again for every frame"
+    row = row_of(cost=cost, note=note)
+    return with_times(row, brief_times(renderer)) if wanted.times == "with" else row, frame
 
-    def again() -> None:
-        took.append(timed(lambda: render_frame(shown))[1].seconds)
 
-    memory = peak_memory(again)
-    if timed_scene is not None and took and took[0] < _RECORDED:
-        memory = peak_memory(again)
-    times = time_frame(shown, seconds=wanted.seconds, slow=wanted.slow, took=took[-1] if took else None)
-    row = row_of(cost=cost, times=times, memory=memory, note="; ".join(notes) or None)
-    if row.work is None:
-        return row, frame
-    rays = time_repeated(camera_rays(shown), seconds=0.5 * wanted.seconds, least=3)
-    return replace(row, work=replace(row.work, rays=rays)), frame
+def with_times(row: Row, found: CellTimes) -> Row:
+    """Return a row with its times."""
+    notes = [row.note, found.note, f"not timed: {found.lost}" if found.lost else None]
+    cost = row.cost and replace(row.cost, prepare_ms=found.prepare_ms)
+    note = "; ".join(filter(None, notes)) or None
+    return replace(row, times=found.times, memory=found.memory, device=found.device, cost=cost, note=note)
 
 
 def _other_runs(scene: Scene, cell: Cell) -> list[Array]:

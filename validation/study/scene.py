@@ -2,7 +2,8 @@
 """The study of one scene: its reference, the checks of the reference, every configuration, images from elsewhere.
 
 Each part is kept on disk as soon as it is there: a study that was killed goes on where it stopped, and one in which
-nothing changed computes nothing.
+nothing changed computes nothing. Errors are kept by configuration. Times are kept by scene, those of all of its
+configurations together: they are compared with one another, and are of one run (`validation.study.turns`).
 """
 
 import hashlib
@@ -37,8 +38,9 @@ from validation.study.configuration import Configuration, configuration_work, us
 from validation.study.cost import Work, reference_work, sampled_work
 from validation.study.reference import of_image
 from validation.study.row import Row
-from validation.study.run import Apart, cell_row, layered_frame, run
+from validation.study.run import cell_row, layered_frame, run, with_times
 from validation.study.study import Cell, Checks, Study
+from validation.study.turns import Apart, CellTimes, time_cells
 from validation.timing import FrameTimes
 
 if TYPE_CHECKING:  # what only reports of images need is imported there
@@ -47,6 +49,7 @@ if TYPE_CHECKING:  # what only reports of images need is imported there
 Layer = NDArray[np.floating]  # frames are float32
 
 _MULTIPLE = (64, 48)  # size of the image whose fraction of multiple scattering is measured [pixels]
+_LONG = 25e3  # after a longer first frame, compilation included, no larger frame is timed [ms]
 _COMPILED = 2.0  # that the kernels of a configuration or an estimator take [s], beside its work on one thread
 
 
@@ -63,13 +66,17 @@ class SceneStudy:
         """The scene as methods read it."""
         return read_scene(self.loaded.scene)
 
+    @property
+    def timed_size(self) -> tuple[int, int]:
+        """The size of the frames that are timed [pixels]."""
+        return self.study.measure.timed_size or self.size
+
     @cached_property
-    def timed(self) -> Scene | None:
-        """The scene at the size of the timed frames; None if that is the size of the images."""
-        size = self.study.measure.timed_size
-        if size is None or size == self.size:
-            return None
-        with self.at(size) as scene:
+    def timed(self) -> Scene:
+        """The scene at the size of the frames that are timed."""
+        if self.timed_size == self.size:
+            return self.scene
+        with self.at(self.timed_size) as scene:
             return read_scene(scene)
 
     @cached_property
@@ -141,7 +148,11 @@ class SceneStudy:
         parts["multiple scattering"] = 0.0 if kept else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
         for chosen in self.configurations:
             kept = measured.is_kept(*self.given(chosen))
-            parts[chosen.label] = 0.0 if kept else _seconds(configuration_work(self.scene, chosen))
+            parts[chosen.label] = 0.0 if kept else _seconds(configuration_work(self.scene, chosen, frames=1))
+        works = [configuration_work(self.timed, chosen) for chosen in self.configurations]
+        together = self.timed_together
+        known = together is None or scene_times.is_kept(*together)
+        parts["times"] = 0.0 if known else sum(map(_seconds, works))
         return parts
 
     @property
@@ -151,11 +162,28 @@ class SceneStudy:
 
     def given(self, chosen: Configuration) -> tuple[Cell, str | None, list[str], Mapping[str, str]]:
         """Return the inputs that decide the row and the image of a configuration."""
-        return replace(self.cell(chosen), scene=self.identity), self.reference_key, user_code(chosen), self.machine
+        # How long frames are timed, and at which size, decides no error.
+        measure = self.study.measure
+        times = "stages" if measure.times == "stages" else "none"
+        errors = replace(measure, times=times, seconds=0.0, slow=None, timed_size=None)
+        cell = replace(self.cell(chosen), scene=self.identity, measure=errors)
+        return cell, self.reference_key, user_code(chosen), self.machine
 
     def given_image(self, shown: "EngineImage", digest: str, times: Any) -> tuple[Any, ...]:
         """Return the inputs that decide the row of an image, from the digest of its file and its times."""
         return self.identity, self.reference_key, self.size, shown.label, shown.path.name, digest, times
+
+    @property
+    def timed_together(self) -> tuple[list[Cell], list[list[str]], Mapping[str, str]] | None:
+        """The inputs that decide which times are of one run; None where nothing is timed."""
+        if self.study.measure.times == "none" or not self.configurations:
+            return None
+        cells = [self.timed_cell(chosen, self.identity) for chosen in self.configurations]
+        return cells, [user_code(chosen) for chosen in self.configurations], self.machine
+
+    def timed_cell(self, chosen: Configuration, scene: str) -> Cell:
+        """Return the cell of a configuration at the size of timed frames; `scene`: its name or identity."""
+        return replace(self.cell(chosen), scene=scene, size=self.timed_size)
 
 
 def _seconds(work: Work) -> float:
@@ -227,6 +255,13 @@ def study_scene(
     for chosen in study.configurations:
         progress(chosen.label)
         rows.append(_row(study, chosen, apart, ended or {}))
+    progress("times")
+    together, timings = study.timed_together, list[Kept[Any]]()
+    if together is not None:
+        timings.append(scene_times.result(*together, study=study, rows=[judged.row for judged in rows], apart=apart))
+        rows = [
+            replace(each, row=with_times(each.row, found)) for each, found in zip(rows, timings[0].value, strict=True)
+        ]
     # Nothing is timed any more: FLIP, which runs on one processor in a separate process, may have all of them.
     with ThreadPoolExecutor(workers) as pool:
         rows = list(pool.map(_with_flip, rows))
@@ -234,7 +269,8 @@ def study_scene(
     methods = [result for row in rows for result in row.results]
     seconds = {"reference": reference.seconds, "agreement": agreement.seconds, "multiple": multiple.seconds}
     seconds["methods"] = round(sum(result.seconds for result in methods), 3)
-    results: tuple[Kept[Any], ...] = (reference, agreement, multiple, *methods)
+    seconds["times"] = round(sum(result.seconds for result in timings), 3)
+    results: tuple[Kept[Any], ...] = (reference, agreement, multiple, *methods, *timings)
     return SceneResult(study, reference.value, agreement.value, multiple.value, tuple(rows), seconds, results)
 
 
@@ -285,10 +321,31 @@ def measured(
 ) -> Judged:
     """Return the row and the image of a cell, whose scene is an identity; `code` is that of the user in it."""
     asked, kept = replace(cell, scene=study.path), study.kept_reference
-    reference = of_image(kept.value, kept.spent)
-    row, frame = run(asked, study.scene, reference, timed_scene=study.timed, apart=apart)
+    row, frame = run(asked, study.scene, of_image(kept.value, kept.spent), apart=apart)
     row = record_of(row, Row)  # without numbers that are not finite
     return Judged(row, None if frame is None else layered_frame(study.name, cell.chosen, frame))
+
+
+@kept("scene-times", worth=lambda found: not any(each.lost for each in found))
+def scene_times(
+    asked: list[Cell],
+    code: list[list[str]],
+    machine: Mapping[str, str],
+    *,
+    study: SceneStudy,
+    rows: Sequence[Row],
+    apart: Apart | None,
+) -> list[CellTimes]:
+    """Return the times of all cells of a scene, of one run; `rows`: what came of them, as not all can be timed."""
+    cells = []
+    for chosen, row in zip(study.configurations, rows, strict=True):
+        cell = study.timed_cell(chosen, study.path)
+        long = row.cost is not None and row.cost.first_ms > _LONG
+        cells.append(None if row.status != "done" else replace(cell, size=study.size) if long else cell)
+    timings = time_cells(cells, lambda cell: study.timed if cell.size == study.timed_size else study.scene, apart=apart)
+    at = "timed at {} x {}: larger frames take minutes".format(*study.size)
+    smaller = [cell is not None and cell.size != study.timed_size for cell in cells]
+    return [replace(found, note=at) if less else found for found, less in zip(timings, smaller, strict=True)]
 
 
 def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: Mapping[Configuration, str]) -> Judged:
@@ -353,15 +410,10 @@ def measured_image(
     judged, layers, surface = measure_image(
         shown, study.loaded, study.reference_of, surfaces=study.scene.features.surfaces
     )
-    row = Row(
-        scene=study.path,
+    row = replace(
+        cell_row(study.cell(Configuration("image"))),
         label=label,
-        method="image",
-        kernel=None,
-        parameters="{}",
-        width=size[0],
-        height=size[1],
-        status="done",
+        command=None,  # another program shows it
         note=notes_of(judged, times),
         kind="image",
         layer=judged.expected,

@@ -88,7 +88,7 @@ class Measure:
     times: str = "with"  #: one of `TIMES`
     seconds: float = 0.6  #: spent on each of the times of 'stages'
     timed_size: tuple[int, int] | None = None  #: of the frames that are timed by stages [pixels]; None: of the image
-    slow: float | None = None  #: see `validation.study.frame_times.time_frame` [s]
+    slow: float | None = None  #: see `validation.study.turns.time_alone` [s]
     limit: float | None = None  #: a cell is left out if a frame would take longer [s]; None: never
     flip: bool = False  #: HDR-FLIP, which takes about a second
     every_metric: bool = True  #: those of other tools, colours, and the error that a method states for itself

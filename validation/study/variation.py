@@ -13,7 +13,7 @@ these, with errors from the spread of the runs.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from analytic.errors import InputError
 from realtime.frame.renderer import FrameRenderer, render_frame
 from realtime.scene.read_scene import Scene, read_scene
 from validation.arrays import Array, Counted
+from validation.clock import Piece, in_turns
 from validation.estimates.quadrature import reference_image
 from validation.motion.judge import motion_verdict
 from validation.motion.measures import Measures, mean_measures, measure
@@ -31,8 +32,9 @@ from validation.scenes.animation import animate, frame_changes
 from validation.scenes.changes import change_scene
 from validation.scenes.registry import Animation
 from validation.study.configuration import Configuration, prepared
-from validation.study.frame_times import brief_times, timed_image
+from validation.study.frame_times import Turn, brief_turn, timed_image
 
+_SECONDS = 0.2  # for the times of a method [s]
 _SURE = 2.0  # standard errors, below which the mean of the runs is not told from the reference
 BEFORE = 8  #: frames at rest before a step
 _JUMP = 12  # of a turn, that a step is
@@ -61,12 +63,13 @@ def method_noise(
     """Return the noise of each configuration's airlight.
 
     `scene`: the `mi.Scene`, at its own size; `runs`: of a method that draws random numbers, at least two. The time of a
-    frame is a median while nothing moves. Raises InputError for fewer runs and a dark reference.
+    frame is a median while nothing moves, of one run of all methods in turns. Raises InputError for fewer runs and a
+    dark reference.
     """
     if runs < 2:
         raise InputError(f"runs: got {runs}, expected at least two")
     read, reference = read_scene(scene), reference_image(scene).airlight
-    found = []
+    rendered, turns = [], list[Turn]()
     for number, chosen in enumerate(configurations):
         renderer = prepared(read, chosen)
         count = runs if renderer.method.noisy else 1
@@ -75,14 +78,19 @@ def method_noise(
             if progress is not None:
                 progress(number * runs + run, len(configurations) * runs, chosen.label)
             images.append(np.asarray(render_frame(replace(renderer, run=run)).airlight, dtype=np.float64))
-        seconds = brief_times(renderer)[0].frame.median_ms / 1e3
+        turns.append(brief_turn(renderer))
         if all(np.array_equal(each, images[0]) for each in images[1:]):
             images = images[:1]
         mean, deviation = np.mean(images, axis=0), np.std(images, axis=0, ddof=min(1, len(images) - 1))
         told = np.abs(mean - reference) > _SURE / math.sqrt(count) * deviation
-        noise, shown = measure_noise(reference, images, seconds), np.where(told, mean, reference)
-        found.append(MethodNoise(chosen.label, noise, reference, shown, deviation))
-    return found
+        rendered.append((images, np.where(told, mean, reference), deviation))
+    # All methods take turns: their times are compared.
+    spent = in_turns([Piece(turn, _SECONDS) for turn in turns])
+    seconds = [float(np.median([turn[0].frame.seconds for turn in chain(*rounds)])) for rounds in spent]
+    return [
+        MethodNoise(chosen.label, measure_noise(reference, images, took), reference, shown, deviation)
+        for chosen, (images, shown, deviation), took in zip(configurations, rendered, seconds, strict=True)
+    ]
 
 
 @dataclass(frozen=True)

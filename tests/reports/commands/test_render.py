@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import airlight
-import validation.study.frame_times
+import validation.study.turns
 from reference.storage.exr import read_exr
 from reports.commands import main as cli
 
@@ -46,8 +46,8 @@ def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_bes
 @pytest.mark.claim("render-says-what-it-wrote")
 def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, tmp_path, capfd, monkeypatch):
     timed = []
-    real = validation.study.frame_times.time_frame
-    monkeypatch.setattr("validation.study.frame_times.time_frame", lambda *given: timed.append(1) or real(*given))
+    real = validation.study.turns.time_alone
+    monkeypatch.setattr("validation.study.turns.time_alone", lambda *given: timed.append(1) or real(*given))
     layers, picture = str(tmp_path / "fog.exr"), str(tmp_path / "fog.png")
     run("open-fog", *SMALL, "--samples", "4", "-o", layers, "-o", picture)
     printed = capfd.readouterr().out

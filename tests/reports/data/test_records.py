@@ -30,11 +30,11 @@ def changed(folder, change):
     ("text", "message"),
     [
         ("{", "is not valid JSON"),
-        ("[]", "has no schema, expected 'airlight-report/3'"),
-        ('{"schema": "airlight-report/2"}', "the schema 'airlight-report/2', expected 'airlight-report/3'; make the"),
+        ("[]", "has no schema, expected 'airlight-report/4'"),
+        ('{"schema": "airlight-report/3"}', "the schema 'airlight-report/3', expected 'airlight-report/4'; make the"),
         (
-            '{"schema": "airlight-report/3"}',
-            "does not keep to airlight-report/3: report: Object missing required field `created`; make",
+            '{"schema": "airlight-report/4"}',
+            "does not keep to airlight-report/4: report: Object missing required field `created`; make",
         ),
     ],
 )

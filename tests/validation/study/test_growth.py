@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: times are medians of turns after warm-up, exponents are theirs, a jump is a cliff; each work has its steps."""
+"""Claim: exponents are those of times, a jump is a cliff; each work has its steps, of one anchor."""
 
 import sys
 
@@ -8,14 +8,10 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
-from realtime.frame.renderer import frame_renderer
-from realtime.methods.registry import METHODS
 from realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
-from validation.clock import peak_memory, time_in_turns, time_repeated
-from validation.study import frame_times as timing
+from validation.clock import peak_memory
 from validation.study.configuration import configuration
-from validation.study.frame_times import time_frame
 from validation.study.growth import growth, ladder, study_growth, subdivided, triangles_of
 from validation.study.study import Measure, Study
 
@@ -71,6 +67,8 @@ def test_a_study_measures_every_step_and_says_who_refuses(variant):
     assert [cost.work for cost in measured.costs] == [128, 256]
     assert all(getattr(cost, name).median_ms > 0 for cost in measured.costs for name in ("frame", "rays"))
     assert measured.refused is None
+    assert measured.run.anchor.median_ms > 0
+    assert measured.run.between >= 1
     assert refused.costs == ()
     assert "map" in refused.refused
     assert told[-1][:2] == (4, 4)
@@ -89,78 +87,6 @@ def test_a_scene_keeps_what_has_no_triangles_to_cut(variant):
     assert (after.camera.width, after.camera.height) == (before.camera.width, before.camera.height)
     with pytest.raises(InputError, match="no opaque meshes"):
         subdivided(mi.load_dict(tiny_scene(floor=None)), 1)
-
-
-class Clock:
-    """A clock that goes on only while work is done: no test waits, and no other load counts."""
-
-    def __init__(self):
-        self.now, self.calls = 0.0, []
-
-    def perf_counter(self):
-        return self.now
-
-    def process_time(self):
-        return 2 * self.now
-
-    def work(self, name, *times):
-        """Work that takes these times [ms] one after the other, the last one again and again."""
-
-        def done():
-            self.now += 1e-3 * times[min(self.calls.count(name), len(times) - 1)]
-            self.calls.append(name)
-
-        return done
-
-
-@pytest.fixture
-def clock(variant, monkeypatch):
-    clock = Clock()
-    monkeypatch.setattr("analytic.clock.time", clock)
-    return clock
-
-
-@pytest.mark.claim("times-are-medians", tolerance="rounding")
-def test_times_are_medians_and_quartiles_without_the_warm_up(clock):
-    timing = time_repeated(clock.work("a", 300, 300, 1, 2, 300, 4, 5), seconds=0.0, least=5, most=5)
-    assert len(clock.calls) == 7
-    assert (timing.low_ms, timing.median_ms, timing.high_ms) == pytest.approx((2, 4, 5))
-    assert timing.cpu_ms == pytest.approx(2)  # the least, of two processors
-    assert time_repeated(clock.work("b", 1), seconds=10.0, most=17).repetitions == 17
-    assert time_repeated(clock.work("c", 1), seconds=0.0, least=3).repetitions == 3
-
-
-def test_works_are_timed_in_turns(clock):
-    slow, fast = time_in_turns([clock.work("slow", 20), clock.work("fast", 5)], seconds=0.0, least=5)
-    assert clock.calls == ["slow", "fast"] * 7  # two turns of warm-up
-    assert (slow.repetitions, fast.repetitions) == (5, 5)
-    assert (slow.median_ms, fast.median_ms) == pytest.approx((20, 5))
-
-
-@pytest.mark.parametrize(("spent", "turns"), [(0.0, 1), (1e6, 5)])
-def test_a_slow_frame_is_timed_a_few_times(variant, monkeypatch, spent, turns):
-    """A frame that takes minutes must not be rendered thirty times."""
-    monkeypatch.setattr(timing, "_TURNS", spent)
-    scene = read_scene(mi.load_dict(tiny_scene(size=(16, 12))))
-    renderer = frame_renderer(scene, METHODS["ray-march"], steps=3)
-    assert time_frame(renderer, seconds=0.01).frame.repetitions >= 5  # not slow
-    times = time_frame(renderer, slow=-1.0)
-    each = (
-        times.frame,
-        times.surface,
-        times.airlight,
-        times.light_moved,
-        times.objects_moved,
-        times.light_moved_camera_cached,
-        times.colours_changed,
-    )
-    assert {spread.repetitions for spread in each} == {turns}
-    assert all(0 < spread.low_ms <= spread.median_ms <= spread.high_ms for spread in each)
-    assert times.frame.median_ms <= times.light_moved.median_ms <= times.objects_moved.median_ms
-    assert times.colours_changed.median_ms <= times.light_moved_camera_cached.median_ms
-    if turns == 1:
-        assert times.frame.median_ms == pytest.approx(times.surface.median_ms + times.airlight.median_ms)
-        assert all(spread.low_ms == spread.median_ms == spread.high_ms for spread in each)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux lets a process forget an earlier peak")

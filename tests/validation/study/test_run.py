@@ -136,10 +136,8 @@ def test_a_refusal_is_a_row():
     assert row.reference.mean > 0
 
 
-@pytest.mark.usefixtures("variant")
-def test_what_would_take_too_long_is_left_out_with_what_it_would_take(monkeypatch):
+def test_what_would_take_too_long_is_left_out_with_what_it_would_take(clock, monkeypatch):
     """16 x 12 pixels are four times 8 x 6: 0.15 s there, of which little is preparation, are at least 0.4 s here."""
-    clock = Clock()
     render = module.render_frame
 
     def slowed(renderer):
@@ -148,7 +146,6 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(monkeypatc
 
     monkeypatch.setattr(module, "_DOUBTFUL", -1.0)
     monkeypatch.setattr(module, "PROBE", (8, 6))
-    monkeypatch.setattr("analytic.clock.time", clock)
     monkeypatch.setattr(module, "render_frame", slowed)
     row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.3))[0]
     assert (row.status, row.error, row.times) == ("left out", None, None)
@@ -156,33 +153,19 @@ def test_what_would_take_too_long_is_left_out_with_what_it_would_take(monkeypatc
     assert "more than the limit of 0.3 s" in row.reason
 
 
-@pytest.mark.usefixtures("variant")
-def test_a_frame_is_judged_by_the_preparation_of_all_its_groups_of_lights(monkeypatch):
+def test_a_frame_is_judged_by_the_preparation_of_all_its_groups_of_lights(clock, monkeypatch):
     """Making the renderer takes no time, and a preparation a second."""
-    clock, prepare = Clock(), FrameRenderer.prepare
+    prepare = FrameRenderer.prepare
 
     def slowed(renderer, scene):
         clock.now += 1
         return prepare(renderer, scene)
 
-    monkeypatch.setattr("analytic.clock.time", clock)
     monkeypatch.setattr(FrameRenderer, "prepare", slowed)
     monkeypatch.setattr(module, "light_groups", lambda renderer: ("first", "second"))
     row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.5))[0]
     assert (row.status, row.error, row.times) == ("left out", None, None)
     assert "what a frame prepares takes 1 s, more than the limit of 0.5 s" in row.reason
-
-
-class Clock:
-    """A clock that goes on only where a test says so."""
-
-    now = 0.0
-
-    def perf_counter(self):
-        return self.now
-
-    def process_time(self):
-        return self.now
 
 
 @pytest.mark.slow
