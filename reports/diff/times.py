@@ -90,10 +90,6 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
     notes: dict[Finding, None] = {}
     for key in [key for key in before if key in after]:
         (size, note, old_times), (new_size, new_note, new_times) = before[key], after[key]
-        run = new_times.run
-        if run is not None and run == old_times.run:
-            notes[Finding("note", key[0], "", f"times not compared: both reports show the run of {run.started}")] = None
-            continue
         if size != new_size:
             sizes = " and ".join("x".join(map(str, pixels)) for pixels in (size, new_size))
             notes[Finding("note", key[0], "", f"times not compared: the frames timed are {sizes} pixels")] = None
@@ -101,6 +97,9 @@ def _pairs(old: Report, new: Report) -> tuple[dict[Key, tuple[Times, Times]], li
             notes[
                 Finding("note", *key, f"times not compared: {note or 'as usual'} before, {new_note or 'as usual'} now")
             ] = None
+        elif new_times.run is not None and new_times == old_times:
+            words = f"times not compared: both reports show the run of {new_times.run.started}"
+            notes[Finding("note", key[0], "", words)] = None
         else:
             pairs[key] = old_times.measured, new_times.measured
     return pairs, list(notes)

@@ -168,7 +168,7 @@ def methods(
     for scene, tell in scene_by_scene(loaded, "methods", progress):
         measure = Measure("stages", seconds, every_metric=False)
         read, _, cell = cells_of(scene, measure, apart=apart)
-        useful, measured = configurations_for(read.features, chosen), list[tuple[CellRow, Any]]()
+        useful, measured = configurations_for(read.features, chosen), list[tuple[Any, Any]]()
         for at, each in enumerate(useful):
             tell(0.5 * at / len(useful), each.label)
             measured.append(cell(each))

@@ -7,6 +7,7 @@ for comparisons, with times that are as noisy as a machine.
 """
 
 import copy
+import itertools
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
@@ -21,6 +22,7 @@ LABELS = ("unshadowed (exact)", "ray-march (steps=100)", "shadow-planes (exact)"
 SCENES = ("fog", "hall", "pens")
 WHEN = "2026-11-21 12:00:00 +0000"
 RUN = {"started": WHEN, "rounds": 5, "anchor": None, "between": 1.01, "within": 1.02, "steady": True}
+_RUNS = itertools.count()  # no two reports to compare are of one run
 
 _STAGES = {"surface": 0.3, "airlight": 0.7, "frame": 1.0, "light_moved": 1.4, "objects_moved": 1.9}  # of a frame's work
 
@@ -180,7 +182,7 @@ def times(frame_ms: float, rng: np.random.Generator | None = None, *, busy: floa
     Without a generator exact ones. A machine that is busy now and then, by the fraction `busy`, adds up to three times
     the work to whole timings, and to single repetitions of the others: both were seen.
     """
-    stages: dict[str, Any] = {"run": RUN | {"started": f"{WHEN}, {frame_ms}, {rng}"}}
+    stages: dict[str, Any] = {"run": RUN | {"started": f"run {next(_RUNS)}"}}
     for stage, fraction in _STAGES.items():
         count = 40 if fraction <= 1 else 12
         samples = np.full(count, frame_ms * fraction)

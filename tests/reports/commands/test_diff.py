@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight diff`: what is worse, what is better and what is not compared, beyond the noise of a machine."""
 
+import copy
 import json
 
 import pytest
@@ -191,6 +192,20 @@ def test_times_of_two_devices_are_never_compared():
     assert (
         "times not compared: llvmpipe (LLVM 15.0.6, 256 bits) before, NVIDIA A100 now" in words(difference, "note")[0]
     )
+
+
+@pytest.mark.claim("times-of-one-run")
+def test_one_run_is_not_compared_with_itself_and_a_change_of_the_machine_is_named():
+    old, new = report(), report(1)
+    same = compare_reports(old, copy.deepcopy(old))
+    assert same.times.compared == 0
+    assert "times not compared: both reports show the run of" in words(same, "note")[0]
+    for row in new["scenes"][1]["methods"]:
+        row["times"]["run"] |= {"steady": False, "between": 1.9, "within": 1.1}
+    different = compare_reports(old, new)
+    assert different.times.compared > 0
+    changed = [each for each in found(different, "note") if "the machine changed while" in each.what]
+    assert {(note.scene, note.old, note.new) for note in changed} == {("hall", 1.1, 1.9)}
 
 
 def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):

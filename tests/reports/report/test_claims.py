@@ -4,7 +4,7 @@ import copy
 import pytest
 
 from reports.report import claims as made
-from tests.helpers.reports import agreement, checked, entry, report_of, scene
+from tests.helpers.reports import RUN, agreement, checked, entry, report_of, scene
 from tests.helpers.reports import refused as refused_entry
 
 
@@ -49,7 +49,8 @@ def scenes():
 
 @pytest.mark.claim("claims-follow")
 def test_claims_on_a_reference_that_is_confirmed():
-    assert [(claim.kind, claim.good) for claim in claims(scenes())] == [("reference", True), ("left-out", None)]
+    kinds = [("reference", True), ("left-out", None), ("times", None)]
+    assert [(claim.kind, claim.good) for claim in claims(scenes())] == kinds
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
     assert claims([]) == []
     data = scenes()
@@ -93,3 +94,16 @@ def test_what_failed_is_named_with_its_pixels():
     failed = [claim for claim in claims(data) if claim.kind == "failed"]
     assert [claim.good for claim in failed] == [False] * 3
     assert all(words in claim.text for words, claim in zip(("fast in fog (3", "fast in fog (2", "hall (7)"), failed))
+
+
+@pytest.mark.claim("times-of-one-run", "claims-follow")
+def test_a_machine_that_changed_while_a_scene_was_timed_is_named():
+    data = scenes()
+    assert "machine" not in texts(data)[-1]
+    for row in data[1]["methods"]:
+        row["times"]["run"] = RUN | {"started": "2026-11-22 07:00:00 +0000", "steady": False, "between": 1.7}
+    assert texts(data)[-1] == (
+        "The times of a scene are of one run, in which its methods took turns: between 2026-11-21 12:00:00 +0000 and "
+        "2026-11-22 07:00:00 +0000. The machine changed meanwhile, so that ratios count there, and no milliseconds: "
+        "hall (1.70 times between rounds, 1.02 within one)."
+    )

@@ -123,7 +123,7 @@ def again(written, tmp_path, **options):
 @pytest.mark.claim("report-kept")
 def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
     repeated = again(written, tmp_path)
-    assert (repeated["cached"], repeated["computed"]) == (3 + len(CHOSEN), 0)
+    assert (repeated["cached"], repeated["computed"]) == (3 + len(CHOSEN) + 1, 0)
     assert repeated["measured"] == written.data["measured"]
     (scene,), (scene_after,) = written.data["scenes"], repeated["scenes"]
     assert [m["cached"] for m in scene_after["methods"]] == [True] * len(CHOSEN)
@@ -134,6 +134,27 @@ def test_a_second_report_is_kept_in_full(written, variant, tmp_path):
     }
     for name in named_files(written.report):
         assert (tmp_path / "again" / name).read_bytes() == (written.folder / name).read_bytes()
+
+
+@pytest.mark.claim("times-of-one-run")
+def test_a_new_method_takes_its_errors_alone_and_times_of_all_in_one_run(written, variant, tmp_path):
+    """Times of a busy hour once stood beside a user's method of the minute."""
+    new = Configuration("ray-march", None, (("steps", 7),))
+    repeated = again(written, tmp_path, configurations=(*CHOSEN, new))
+    assert (repeated["cached"], repeated["computed"]) == (3 + len(CHOSEN), 1 + 1)
+    before, after = (report["scenes"][0]["methods"] for report in (written.data, repeated))
+    assert [row["cached"] for row in after] == [True] * len(CHOSEN) + [False]
+    for old, now in zip(before, after, strict=False):
+        assert (old["error"], old["measured"]) == (now["error"], now["measured"])
+    timed = [row["times"] for row in after if row["times"]]
+    assert len(timed) == len(CHOSEN)  # taylor refuses
+    assert all(times["run"] == timed[0]["run"] for times in timed)
+    assert all(row["times"] != now["times"] for row, now in zip(before, after, strict=False) if row["times"])
+    assert timed[0]["run"]["anchor"]["median_ms"] > 0
+    # The first group is still there, whole, with its date.
+    assert [row["times"] for row in again(written, tmp_path)["scenes"][0]["methods"]] == [
+        row["times"] for row in before
+    ]
 
 
 @pytest.mark.claim("report-kept")
@@ -158,7 +179,7 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
     multiple = written.data["scenes"][0]["multiple"]
     monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
     repeated = again(written, tmp_path, fresh=True, configurations=(MARCH,), checks=checks)
-    assert (repeated["cached"], repeated["computed"]) == (0, 3 + 1)
+    assert (repeated["cached"], repeated["computed"]) == (0, 3 + 1 + 1)
     assert set(calls) == {quadrature_image, single_scatter_batch}
     # The same numbers, except for the times.
     before, (after,) = written.data["scenes"][0]["methods"][-1], repeated["scenes"][0]["methods"]

@@ -78,7 +78,7 @@ def test_scaling_that_jumps_ends_with_1_and_is_drawn(variant, capfd, monkeypatch
     arguments = ["scaling", "sphere-spot", "--kinds", "size", "--method", "unshadowed", "--size", "80x60"]
     arguments += ["-o", str(tmp_path / "growth.png")]
     for jump, status in ((False, 0), (True, 1)):
-        found = growth_record(cliff=jump) | {"scene": "sphere-spot"}
+        found = growth_record(cliff=jump) | {"scene": "sphere-spot", "run": None}
         monkeypatch.setattr(
             "validation.study.growth.study_growth", lambda *given, found=found, **options: [record_of(found, Scaling)]
         )

@@ -10,8 +10,8 @@ from reports.data.records import Method, Scene
 from reports.tables.agreement import verdict
 from reports.tables.costs import cliffs, scaling_tables
 from reports.tables.drawing import csv, html, latex, markdown, text
-from reports.tables.methods import COLUMNS, TIMES, fastest_table, methods_table
-from tests.helpers.reports import agreement, errors, growth_record, record_of, scene
+from reports.tables.methods import COLUMNS, TIMES, fastest_table, method_row, methods_table, times_words
+from tests.helpers.reports import RUN, agreement, errors, growth_record, record_of, scene
 from tests.helpers.reports import entry as made
 from validation.statistics.records import Agreement
 from validation.timing import Scaling
@@ -24,7 +24,7 @@ def timing(median):
 
 
 def entry(label="a", *, rmse=0.01, frame=2.0, nonfinite=0, **more):
-    times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame)}
+    times = {name: timing(median) for name, median in MEDIANS.items()} | {"frame": timing(frame), "run": RUN}
     return record_of(made(label, times=times, error=errors(rmse, nonfinite=nonfinite)) | more, Method)
 
 
@@ -61,6 +61,25 @@ def fastest_of(*methods):
     return tuple(row.values.values())
 
 
+@pytest.mark.claim("times-of-one-run")
+def test_a_table_says_of_which_runs_its_times_are():
+    later = RUN | {"started": "2026-11-22 07:00:00 +0000", "steady": False, "between": 1.7}
+    ours, engine = entry("a"), entry("engine", kind="image", times={"frame": timing(0.1)})
+    other = entry("b", times={"frame": timing(3.0), "run": later})
+    assert times_words([ours, entry("c")]) == f"Times: measured in turns in one run of 5 rounds, {RUN['started']}; " + (
+        "the machine stayed as it was (the anchor, camera rays alone: medians within a factor of 1.01 over the run, "
+        "quartiles of 1.02 in a round)."
+    )
+    mixed = times_words([ours, other, engine])
+    assert f"Times of a: measured in turns in one run of 5 rounds, {RUN['started']};" in mixed
+    assert (
+        "Times of b: measured in turns in one run of 5 rounds, 2026-11-22 07:00:00 +0000; the machine CHANGED" in mixed
+    )
+    assert mixed.endswith("is of another run, on another machine or by other rules.")
+    assert method_row(engine).remarks[-1] == "timed elsewhere"
+    assert "timed elsewhere" not in method_row(ours).remarks
+
+
 @pytest.mark.claim("claims-follow")
 def test_the_fastest_method_within_each_error_has_a_cell():
     fast, good, slow = entry("fast", rmse=0.02, frame=1.0), entry("good", rmse=0.004), entry("slow", rmse=1e-4, frame=8)
@@ -77,6 +96,7 @@ def test_the_fastest_method_within_each_error_has_a_cell():
         entry("refused", reason="no series", times=None, error=None),
         entry("not finite", rmse=1e-5, frame=0.1, nonfinite=3),  # its RMSE leaves out the very pixels that are wrong
         entry("image", kind="image", rmse=1e-5, times=None),
+        entry("engine", kind="image", rmse=1e-5, times={"frame": timing(0.1)}),  # of another run than the others
     ],
     ids=lambda never: never.label,
 )

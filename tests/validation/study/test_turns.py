@@ -143,7 +143,7 @@ def test_a_method_of_the_user_takes_its_turns_in_its_process(variant, tmp_path):
     from validation.study.reference import load_cell
 
     file = tmp_path / "mine.py"
-    file.write_text("import os\n\n\ndef fog(view):\n    return 0.1 * view.distance\n")
+    file.write_text("def fog(view):\n    return type(view.medium.albedo)(0.1)\n")
     names = (f"{file}:fog", "unshadowed")
     mine, ours = (Cell("open-fog", (8, 6), (), configuration(name), BRIEF) for name in names)
     read = read_scene(load_cell(mine).scene)
