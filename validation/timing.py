@@ -106,7 +106,9 @@ class FrameTimes:
     colours_changed: Timing | None = column(
         "colours changed", "ms", "a frame after only medium or colours changed", default=None
     )
-    run: TimingRun | None = column(meaning="null for times that another program measured", default=None)
+    run: TimingRun | None = column(
+        meaning="the run in which these were measured, in turns; null for times of another program", default=None
+    )
 
     @property
     def measured(self) -> dict[str, Timing]:
