@@ -52,7 +52,6 @@ from typing import ClassVar
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import gammainccinv, gammaincinv
 
 from analytic.errors import InputError
 from analytic.mie import angular_functions, coefficients, intensities, summed, terms
@@ -116,7 +115,9 @@ class Droplets:
 
     def nodes(self, count: int) -> tuple[Array, Array]:
         """Return `count` radii in increasing order [um] and weights of an average weighted by r^2 [1]."""
-        low, high = gammaincinv(self.gamma + 2, _TAIL), gammainccinv(self.gamma + 2, _TAIL)
+        low, high = (
+            inverse(self.gamma + 2, _TAIL) for inverse in (scipy.special.gammaincinv, scipy.special.gammainccinv)
+        )
         u = low + (high - low) * (np.arange(count) + 0.5) / count
         density = np.exp((self.gamma + 1) * np.log(u / (self.gamma + 1)) - (u - self.gamma - 1))
         return u * self.scale, density / density.sum()

@@ -19,8 +19,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices
 from realtime.errors import InputError
@@ -260,6 +258,9 @@ def _paired_edges(triangles: NDArray[Any]):
 
 def _connected_components(triangles, edges, entries):
     """Return the connected component of every triangle, and by component whether it is closed."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     left, right, same_way = entries
     count = len(triangles)
     if not count:

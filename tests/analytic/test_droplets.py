@@ -10,7 +10,6 @@ from analytic.droplets import Droplets, Modified, optics
 from analytic.errors import InputError
 from analytic.mie import angular_functions, coefficients, efficiencies, intensities
 from analytic.phase import PhaseFunction, phase_from_words
-from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.hg_draine import hg_draine_moments, legendre_moments
 from validation.certified.files import certified_data
 from validation.kernels.case_files import integrate_cases, read_cases
@@ -161,16 +160,6 @@ def test_certified_values():
     assert found == pytest.approx(cases.value, rel=3e-8)
     lobes = np.array([name.startswith("hg-draine") for name in cases.phase])
     assert found[lobes] == pytest.approx(cases.value[lobes], rel=1e-10)
-
-
-@pytest.mark.claim("droplets-certified", tolerance="1e-13: processors round the moments of Mie's series differently")
-@pytest.mark.parametrize("number", [3, pytest.param(50, marks=pytest.mark.slow)])
-def test_a_certified_value_is_certified_again(number):
-    header, *lines = FILE.read_text().splitlines()
-    row = dict(zip(header.split(","), lines[number].split(",")))
-    ray = (float(row[name]) for name in ("t", "h", "x0", "x1", "sigma_t"))
-    again = integrate_certified(*ray, phase_from_words(row["phase"]), digits=18)
-    assert float(again) == pytest.approx(float(row["value"]), rel=1e-13)
 
 
 @pytest.mark.claim("droplets-refused")

@@ -12,9 +12,6 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-import scipy
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from analytic.errors import InputError
 from realtime.errors import InputError as MeshError
@@ -88,8 +85,10 @@ def _overlap(first: Body, second: Body) -> bool:
 
 def _common_sphere(first: Bounds, second: Bounds) -> float:
     """Return the radius of the largest sphere in two convex meshes: the largest t under n . x + t <= offset."""
+    from scipy.optimize import linprog
+
     planes = np.concatenate([first.normals, second.normals])
-    largest = scipy.optimize.linprog(
+    largest = linprog(
         [0, 0, 0, -1],
         A_ub=np.column_stack([planes, np.ones(len(planes))]),
         b_ub=np.concatenate([first.offsets, second.offsets]),
@@ -128,6 +127,9 @@ def _check_nesting(meshes: Sequence[ClosedMesh]) -> None:
 
 def _parts(mesh: ClosedMesh) -> list[tuple[int, Array, bool]]:
     """Return of each connected part of a mesh one triangle, the corners of all, and whether these face outwards."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     tail, head = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     graph = coo_array((np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(len(mesh.vertices),) * 2)
     _, component = connected_components(graph, directed=False)
