@@ -15,6 +15,7 @@ the grid. The densities are then compared with Mitsuba's own at some points, so 
 that is linear between voxels.
 """
 
+import math
 import re
 from dataclasses import dataclass, replace
 from typing import Any
@@ -25,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
-from realtime.numerics.array_types import ArrayTypes, PerRay, aligned_array, four_numbers
+from realtime.memory import check_memory
+from realtime.numerics.array_types import ArrayTypes, PerRay, aligned_array, bytes_of, four_numbers
 from realtime.scene.closed_mesh import ClosedMesh
 
 Array = NDArray[np.float64]
@@ -132,7 +134,7 @@ def read_density(medium: Any, name: str) -> DensityGrid:
         raise InputError(
             f"{name} has an albedo that differs from place to place; expected one number or colour: a 'constvolume'"
         )
-    values = np.array(parameters["sigma_t.data"], dtype=np.float64)
+    values = np.array(parameters["sigma_t.data"], dtype=np.float32)
     if values.ndim == 4 and values.shape[3] > 1:
         raise InputError(
             f"{name} has an extinction of {values.shape[3]} channels on its grid; expected one channel: grey"
@@ -150,7 +152,8 @@ def read_density(medium: Any, name: str) -> DensityGrid:
         raise InputError(f"{name} has the scale {scale:g}; expected a finite number of 0 or more")
     if not largest * scale > 0:
         raise InputError(f"{name} is empty: its grid is 0 everywhere; expected densities above 0 somewhere")
-    grid = DensityGrid((values / largest).astype(np.float32), largest * scale, _transform(medium))
+    values /= np.float32(largest)
+    grid = DensityGrid(values, largest * scale, _transform(medium))
     _compare(name, medium, grid)
     return grid
 
@@ -236,24 +239,36 @@ def density_at(values: NDArray[np.float32], fraction: Array) -> Array:
 
 
 def density_on_device(grids: list[DensityGrid | None], types: ArrayTypes) -> Density:
-    """Return the density of clouds by their grids, None for a homogeneous one."""
-    tables, counts, rows, voxels = [], [], [], []
-    for grid in grids:
-        values = np.ones((1, 1, 1), dtype=np.float32) if grid is None else grid.values
-        count = values.shape[::-1]
+    """Return the density of clouds by their grids, None for a homogeneous one.
+
+    Raises InputError for more voxels than Dr.Jit counts, or than memory holds.
+    """
+    shapes = [(1, 1, 1) if grid is None else grid.values.shape for grid in grids]
+    first = np.cumsum([0, *(math.prod(shape) for shape in shapes)])
+    words, advice = f"density grids of {first[-1]} voxels in all", "use coarser grids"
+    if 4 * first[-1] >= 2**32:
+        raise InputError(f"{words}; expected fewer than {2**30}, which Dr.Jit can count: {advice}")
+    # Four numbers on the device and on the way there, the grid itself, and a copy of it.
+    check_memory(words, int(first[-1]) * (4 * bytes_of(types.scalar) + 6 * 4), advice)
+    table = np.empty((first[-1], 4), dtype=np.float32)
+    counts, rows, voxels = [], [], []
+    for grid, shape, begin in zip(grids, shapes, first, strict=False):
+        values = np.ones(shape, dtype=np.float32) if grid is None else grid.values
+        count = shape[::-1]
+        # Each voxel has its neighbours beside it, itself in their place at the end of a row.
+        corners = table[begin : begin + values.size].reshape(*shape, 4)
+        for number, (down, along) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
+            y, x = (np.minimum(np.arange(n) + step, n - 1) for n, step in zip(shape[1:], (down, along), strict=True))
+            np.take(values[:, y], x, axis=2, out=corners[..., number])
         to_grid = np.zeros((3, 4)) if grid is None else grid.to_grid
         to_voxels = to_grid * np.array(count)[:, None]
         to_voxels[:, 3] -= 0.5
-        x_next = np.concatenate([values[:, :, 1:], values[:, :, -1:]], axis=2)
-        y_next, both = (np.concatenate([own[:, 1:], own[:, -1:]], axis=1) for own in (values, x_next))
-        tables.append(np.stack([values, x_next, y_next, both], axis=-1).reshape(-1, 4))
         counts.append(count)
         rows.append(to_voxels.ravel())
         voxels.append(np.inf if grid is None else grid.voxel)
-    first = np.cumsum([0] + [len(table) for table in tables[:-1]])
     density = Density(
-        aligned_array(types.scalar, np.concatenate(tables).ravel()),
-        aligned_array(mi.UInt32, first.astype(np.uint32)),
+        aligned_array(types.scalar, table.ravel()),
+        aligned_array(mi.UInt32, first[:-1].astype(np.uint32)),
         tuple(aligned_array(mi.UInt32, column) for column in np.array(counts, dtype=np.uint32).T),
         tuple(aligned_array(types.scalar, column) for column in np.array(rows).T),
         types.scalar(voxels),

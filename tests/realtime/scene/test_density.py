@@ -8,9 +8,11 @@ import pytest
 from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer
 from realtime.kernels.registry import KERNELS
+from realtime.memory import Memory
 from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.numerics.array_types import array_types
 from realtime.scene.closed_mesh import closed_mesh, encloses
-from realtime.scene.density import density_at
+from realtime.scene.density import DensityGrid, density_at, density_on_device
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, cloud_of, cloud_scene, dense, linear_between, loaded, ring
 from validation.scenes.meshes import box, joined, placed, torus
@@ -63,6 +65,15 @@ def test_a_turned_grid_far_away():
     found = np.array(density.at(mi.Vector3d(points.T), mi.UInt32(0)))
     # Mitsuba's box in float32 is right to 0.004 m of 50 m wide voxels here.
     np.testing.assert_allclose(found, linear_between(ROUGH, np.zeros(3), np.ones(3), fraction) / ROUGH.max(), atol=5e-4)
+
+
+@pytest.mark.parametrize(("side", "words"), [(1024, "1073741824 voxels in all; expected fewer"), (300, "GB of memory")])
+def test_grids_that_nothing_can_hold_are_refused_before_they_are_copied(monkeypatch, side, words):
+    monkeypatch.setattr("realtime.memory.usable_memory", lambda: Memory(10**9, "this machine has"))
+    voxel = np.broadcast_to(np.float32(1), (side, side, side))  # one number in memory
+    grid = DensityGrid(voxel, 1.0, np.eye(3, 4))
+    with pytest.raises(InputError, match=words):
+        density_on_device([grid], array_types("single"))
 
 
 NEGATIVE = ROUGH.copy()
