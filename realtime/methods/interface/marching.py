@@ -104,24 +104,31 @@ def marched_integral(
 
     Float = type(between.width)
 
-    def step(index, depths, total):
+    summed = airlight.medium.sums_depth and not running
+
+    def step(index, before, depths, total):
         x = between.place(dr.fma(Float(index) + shift, between.width, between.begin))
         length = between.width * between.stretch(x)
         camera = None
+        if summed:
+            # The medium's exact depth, from the sample before this one: no part of the ray is walked twice.
+            added = airlight.medium.optical_depth(airlight.rays, before, x)
+            camera = depths = [depth + more for depth, more in zip(depths, added, strict=True)]
+            before = x
         if running:
             added = [sigma * length for sigma in airlight.medium.extinction(airlight.rays, x)]
             camera = [depth + shift * more for depth, more in zip(depths, added, strict=True)]
             depths = [depth + more for depth, more in zip(depths, added, strict=True)]
         reached = (between.width > 0) & lit(x)
-        return index + 1, depths, total + dr.select(reached, airlight.source(x, camera), 0) * length
+        return index + 1, before, depths, total + dr.select(reached, airlight.source(x, camera), 0) * length
 
-    before = airlight.medium.optical_depth(airlight.rays, 0, between.x0) if running else ()
-    depths = [depth + dr.zeros(Float, lanes) for depth in before]
+    first = airlight.medium.optical_depth(airlight.rays, 0, between.x0) if running or summed else ()
+    depths = [depth + dr.zeros(Float, lanes) for depth in first]
     *_, total = dr.while_loop(
-        state=(mi.UInt32(0), depths, airlight.nothing(lanes)),
-        cond=lambda index, depths, total: index < steps,
+        state=(mi.UInt32(0), between.x0 + dr.zeros(Float, lanes), depths, airlight.nothing(lanes)),
+        cond=lambda index, before, depths, total: index < steps,
         body=step,
-        labels=("index", "depths", "total"),
+        labels=("index", "before", "depths", "total"),
     )
     return total
 

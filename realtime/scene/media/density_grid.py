@@ -30,6 +30,7 @@ class GridMedium(VaryingMedium):
     high: Any  #: the opposite corner [m]
     albedo: Any
     phase: Phase
+    sums_depth = True
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances at which they enter and leave the box [m]."""
@@ -68,7 +69,7 @@ class GridMedium(VaryingMedium):
                 place = dr.fma(rate, x, first)
                 face = dr.select(rate > 0, dr.floor(place) + 1, dr.ceil(place) - 1)
                 ahead = dr.minimum(ahead, dr.select(rate == 0, dr.inf, (face - place) / rate))
-            width = dr.maximum(dr.minimum(ahead, length - x), least)
+            width = dr.minimum(dr.maximum(ahead, least), length - x)
             nodes = (x + (0.5 + side) * width for side in (-_GAUSS, _GAUSS))
             found = [self.density.at(dr.fma(rays.direction, node, start), mi.UInt32(0), x < length) for node in nodes]
             return x + width, dr.fma(0.5 * width, found[0] + found[1], total)

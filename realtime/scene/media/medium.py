@@ -46,6 +46,7 @@ class Medium(ABC):
 
     albedo: Any  #: single-scattering albedo, RGB [1]; its type is that of colours
     phase: Any  #: the phase function
+    sums_depth = False  #: whether depths are walks, so that a march adds those of its steps up
     clear = False  #: whether nothing scatters or absorbs but bounded media
     bounded_media: tuple[Any, ...] = ()  #: those in it
     clouds: Any = None  #: in vacuum: all bounded media, of any shape, for methods that render clouds

@@ -10,6 +10,7 @@ from realtime.errors import InputError
 from realtime.frame.renderer import frame_renderer, render_frame
 from realtime.kernels.registry import KERNELS
 from realtime.methods.registry import FOG_METHODS, METHODS
+from realtime.scene.media.density_grid import GridMedium
 from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
@@ -68,6 +69,15 @@ def test_a_ray_march_goes_to_the_reference(scene, light):
         np.testing.assert_allclose(frame.surface, reference.surface, rtol=1e-4, atol=1e-4 * reference.surface.max())
     assert max(errors[::2]) < 5e-3
     assert errors[2] < 0.5 * errors[1]
+
+
+def test_depths_of_steps_add_up_to_the_depth_from_the_camera(scene, monkeypatch):
+    read = read_scene(scene(INSIDE))
+    marched = []
+    for sums in (True, False):  # else each step walks all cells from the camera on
+        monkeypatch.setattr(GridMedium, "sums_depth", sums)
+        marched.append(render_frame(frame_renderer(read, METHODS["ray-march"], steps=30)).airlight)
+    np.testing.assert_allclose(*marched, rtol=2e-5)
 
 
 @pytest.mark.claim("density-grid-methods", tolerance="5 %: froxels of 6 cm in a box that ends within them")
