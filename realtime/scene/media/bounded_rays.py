@@ -63,13 +63,13 @@ from realtime.numerics.array_types import chosen_value, is_single
 from realtime.numerics.functions import exp_bounded, summed, unit_nodes
 from realtime.scene.lights import Light
 from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
-from realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach
+from realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach, unfinished
 from realtime.scene.media.published_form import ConstantLeg
 from realtime.scene.rule_reach import TANGENT, TURN_DEPTH, TURN_NODES, angle_scale
 
 FORMS = ("exact", "paper", "printed")
 _NODES_DOUBLE = 6
-_MOST = 1000  # panels; no segment needs as many, but a loop over values that are not numbers must end too
+_MOST = 1000  # panels of a segment beside those that end where a path passes from facet to facet
 _DEPTH_DOUBLE = 1.6
 _NEARER, _FARTHER = 0.5, 0.8
 
@@ -201,19 +201,22 @@ def _panels(ray: BoundedRays, piece: Piece, x0, x1, paths: list[LightPaths]):
         envelopes = [own and _after(own, change, end) for own, change in zip(envelopes, changes)]
         return turn + 1, end, envelopes, totals
 
+    # A path enters and leaves each facet of a convex body once, and there are two of them.
+    most = _MOST + 2 * sum(path.bounded.count for path in paths)
     width = dr.width(ray.geometry.height, x0, x1)
     x0 = x0 + dr.zeros(Float, width)
-    *_, totals = dr.while_loop(
+    _, reached, _, totals = dr.while_loop(
         state=(
             dr.zeros(mi.UInt32, width),
             x0,
             [path.envelopes_at(beyond(x0)) for path in paths],
             [dr.zeros(Float, width) for _ in piece.before],
         ),
-        cond=lambda turn, x, envelopes, totals: (x < x1) & (turn < _MOST),
+        cond=lambda turn, x, envelopes, totals: (x < x1) & (turn < most),
         body=panel,
         labels=("turn", "x", "envelopes", "totals"),
     )
+    totals = [unfinished(reached < x1, total) for total in totals]
     return piece.medium.albedo * Color(*(sigma * total for sigma, total in zip(piece.medium.sigma_t, totals)))
 
 

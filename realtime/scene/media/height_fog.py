@@ -43,13 +43,13 @@ import mitsuba as mi
 from realtime.errors import InputError
 from realtime.numerics.array_types import is_single
 from realtime.numerics.functions import exp_bounded, exp_expm1_bounded, unit_nodes
-from realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach
+from realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach, unfinished
 from realtime.scene.phase import Phase
 
 _NODES, _NODES_DOUBLE = 12, 28
 _WIDTH, _SCALE_HEIGHTS, _DEPTH = 4.2, 10.0, 12.0  # of a panel at most: in ln E, of rise, of optical depth
 _WIDTH_ASKED = 6.0  # in ln E of panels with a number of nodes that was asked for
-_MOST = 200  # panels of a segment: no segment needs as many
+_MOST = 200  # panels of a segment: a frame whose segments need more is refused
 _UNBOUNDED = 1e9  # [m]
 _LEVEL = 1e-20  # the rise of a ray, and a difference of heights [m], that stand for none
 
@@ -256,13 +256,13 @@ class HeightRays(LitRays):
             part, depth = self._panel(x, end, depth)
             return turn + 1, end, depth, total + part
 
-        *_, total = dr.while_loop(
+        _, reached, depth, total = dr.while_loop(
             state=(dr.zeros(mi.UInt32, width), x0 + dr.zeros(Float, width), before, dr.zeros(Float, width)),
             cond=lambda turn, x, depth, total: (x < x1) & (depth < deepest) & (turn < _MOST),
             body=panel,
             labels=("turn", "x", "depth", "total"),
         )
-        return total
+        return unfinished((reached < x1) & (depth < deepest), total)
 
     def _longest(self, x):
         """Return the length of the longest panel that begins at x [m]."""

@@ -325,6 +325,11 @@ class HomogeneousRays(LitRays):
         return self.kernel(self.geometry, *self.geometry.lit_segment(x0, x1), self.medium, self.light)
 
 
+def unfinished(ends_early: Any, total: Any) -> Any:
+    """Return an integral, NaN where its loop over panels ended before its segment: a frame refuses such pixels."""
+    return dr.select(ends_early, dr.nan, total)
+
+
 def optical_reach(Float) -> float:
     """Return the optical depths after which a number type has nothing left of light; float64 takes twice as many."""
     return OPTICAL_REACH if is_single(Float) else 2 * OPTICAL_REACH

@@ -7,12 +7,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from realtime.errors import InputError
 from realtime.frame.renderer import render_frame
 from realtime.scene.read_scene import read_scene
 from reference.scene.read import read_reference
 from tests.helpers import airlight_sum, frames
 from tests.helpers.frames import read, relative_rmse
-from tests.helpers.scenes import clear_scene, tiny_scene
+from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.sunlit import ALONG, CUBE_AT, cube, fog_sphere, plank, rays, sun, unit
 from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
@@ -128,6 +129,14 @@ def test_airlight_and_surfaces_are_those_of_the_reference(variant, name):
         walked = render(make(), "light-volumes").airlight
         assert relative_rmse(walked, reference.airlight) < double
         assert walked[2, 2] == pytest.approx(reference.airlight[2, 2], rel=1e-5)
+
+
+def test_a_segment_whose_panels_run_out_is_refused(variant, monkeypatch):
+    """A sum of some of the panels was a dark pixel in silence."""
+    monkeypatch.setattr("realtime.scene.media.bounded_rays._MOST", 1)
+    ball = bounded_medium({"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.4}, 3.1, (0.9, 0.8, 0.7))
+    with pytest.raises(InputError, match=r"airlight of \d+ of 48 pixels is not finite.* more panels"):
+        render(clear_scene(size=(8, 6), ball=ball))
 
 
 def test_an_ambient_field_fills_bounded_media(variant):

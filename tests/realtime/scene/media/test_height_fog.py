@@ -141,6 +141,15 @@ def test_sixteen_nodes_in_w(variant):
     assert np.quantile(relative_errors(by_tag(*GENERIC), "double", find_kernel("quadrature-8")), 0.9) < 1e-5
 
 
+def test_a_segment_whose_panels_run_out_is_not_dark(variant, monkeypatch):
+    """A frame refuses what is not finite; a sum of some of the panels was a dark pixel in silence."""
+    monkeypatch.setattr("realtime.scene.media.height_fog._MOST", 1)
+    errors = relative_errors(by_tag(*GENERIC), "double")
+    finite = np.isfinite(errors)
+    assert not finite.all()
+    assert errors[finite].max() < 1e-9
+
+
 def test_phi_keeps_its_digits(variant):
     for precision, error in (("single", 3e-7), ("double", 3e-15)):
         Float = array_types(precision).scalar
