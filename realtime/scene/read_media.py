@@ -83,13 +83,6 @@ def opaque_scene(scene, opaque):
     """
     if len(opaque) == len(scene.shapes()) and len(scene.emitters()) <= _FEW:
         return scene
-    taken = {shape.id() for shape in opaque}
-    for number, shape in enumerate(opaque, 1):
-        if not shape.id():
-            name = f"{shape.class_name()}-{number}"
-            while name in taken:
-                name += "-unnamed"
-            shape.set_id(name)
     return scene_of(opaque)
 
 

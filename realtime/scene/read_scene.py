@@ -67,7 +67,8 @@ class SceneFeatures:
 class Scene:
     """A Mitsuba scene with what a real-time method reads from it."""
 
-    geometry: Any  #: of all opaque shapes, for casting rays: an `mi.Scene`
+    #: of all opaque shapes, for casting rays: an `mi.Scene`, whose shapes move in place (`realtime.scene.animate`)
+    geometry: Any
     camera: Camera
     medium: Medium
     lights: tuple[Light, ...]  #: those without extent
