@@ -6,6 +6,7 @@ Read in this order:
 - `camera.py`: the pinhole camera, from a pixel to a ray;
 - `phase.py`: phase functions, which say their values and series;
 - `rule_reach.py`: how far rules of few nodes reach for one, by the error of the rules;
+- `rounding.py`: how much float32 coordinates far from the origin change of its lengths;
 - `density.py`: clouds whose density differs from place to place;
 - `lights.py`: point, spot and directional lights as homogeneous positions;
 - `media/`: media, which answer for themselves: extinction, optical depths, airlight;

@@ -33,6 +33,7 @@ from realtime.scene.media.density_grid import GridMedium
 from realtime.scene.media.height_fog import HeightFog
 from realtime.scene.media.medium import Medium
 from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
+from realtime.scene.rounding import rounding_notes
 from realtime.scene.triangle_table import Facets, read_facets
 from realtime.transforms import beam_axis, host_matrix, spot_axis
 
@@ -358,7 +359,8 @@ def backgrounds(scene, *, clouds: bool = True) -> list[Any]:
 def scene_notes(scene, *, clouds: bool = True) -> list[str]:
     """Return notes on the cameras and the lights of a Mitsuba scene, a line each."""
     cameras = len(scene.sensors())
-    notes = [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
+    notes = rounding_notes(scene)
+    notes += [f"the scene has {cameras} cameras: the first is used, the others are left out"] if cameras > 1 else []
     notes += [
         f"light '{emitter.id()}' around the scene is seen behind it; light of it that is scattered is left out"
         + " by methods: references and fog colours have it" * (emitter.class_name() == "ConstantBackgroundEmitter")

@@ -13,6 +13,8 @@ import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
+from realtime.errors import InputError as MethodError
+from realtime.scene.rounding import check_rounding
 from validation.arrays import Array
 
 LARGEST_LENGTH = 1e9  #: of a coordinate or a radius [m], also of an extinction [1/m]
@@ -30,7 +32,10 @@ _FLATTEST = 1e-9  # of one axis beside another
 
 
 def check_numbers(scene: Any) -> None:
-    """Refuse an `mi.Scene` with a number that no image can be computed from, by the name of its part."""
+    """Refuse an `mi.Scene` with a number that no image can be computed from, by the name of its part.
+
+    So is a scene whose lengths are lost in its coordinates (`realtime.scene.rounding`).
+    """
     for name, plugin in _plugins(scene):
         parameters = mi.traverse(plugin)
         for key in parameters.keys():  # noqa: SIM118 - SceneParameters iterates over items
@@ -39,6 +44,10 @@ def check_numbers(scene: Any) -> None:
                 _check(name, key, values)
         if "faces" in parameters:
             _check_faces(name, parameters)
+    try:
+        check_rounding(scene)
+    except MethodError as error:
+        raise InputError(str(error)) from None
 
 
 def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:

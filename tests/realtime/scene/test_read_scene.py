@@ -13,6 +13,7 @@ from realtime.frame.renderer import render_frame
 from realtime.numerics.array_types import array_types
 from realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
 from realtime.scene.read_scene import read_scene
+from realtime.scene.rounding import check_rounding
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from validation.scenes.height_fog import register_height_fog
 from validation.scenes.loading import load_scene
@@ -90,6 +91,27 @@ def test_numbers_that_no_medium_has_are_refused_whoever_built_the_scene(variant,
     assert read(fog=fog).medium.channels == 1
     with pytest.raises(InputError, match=words) as refusal:
         read(fog=fog | changes)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(("offset", "outcome"), [(0.0, ""), (3e3, "noted"), (4e5, "refused")])
+def test_lengths_that_coordinates_lose_are_noted_or_refused(variant, offset, outcome):
+    """In map coordinates an image was 10 % off, "known to 2e-11": float32 rounds positions before anyone reads them."""
+    moved = mi.ScalarTransform4f().translate([offset, 0.0, 0.0])
+    parts = tiny_scene(floor=None)
+    parts["sensor"] = parts["sensor"] | {"to_world": moved @ parts["sensor"]["to_world"]}
+    for name, key in (("lamp", "position"), ("ball", "center")):
+        x, *others = parts[name][key]
+        parts[name] = parts[name] | {key: [x + offset, *others]}
+    scene = mi.load_dict(parts)
+    notes = read_scene(scene).features.notes
+    assert len(notes) == (outcome != "")
+    assert all("the scene is 4.79 m large" in note for note in notes if offset < 1e4)
+    if outcome != "refused":
+        check_rounding(scene)
+        return
+    with pytest.raises(InputError, match=r"subtract an offset, such as \(400000, -4, 1\)") as refusal:
+        check_rounding(scene)
     assert "\n" not in str(refusal.value)
 
 
