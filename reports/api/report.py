@@ -4,8 +4,7 @@
 import math
 import os
 import shlex
-import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -195,9 +194,41 @@ def report(
     effort = "quick" if quick else "full" if full else "default"
     target = Path(FOLDER if output is None else output)
     asked = (several(scenes), several(method), several(kernel), settings)
-    data = _measured(target, effort, *asked, images=images, fresh=fresh, cluster=cluster, progress=progress)
+    places = {"images": images, "output": output, "figures": figures, "cluster": cluster}
+    command = _command(*asked, {"quick": quick, "full": full, "fresh": fresh, **places})
+    data = _measured(
+        target, effort, *asked, images=images, fresh=fresh, cluster=cluster, command=command, progress=progress
+    )
     written = _figures(target, figures, [], []) if figures else ()
     return Report(folder=target, data=data, done=_done(data), figures=written)
+
+
+def _command(
+    scenes: Sequence[Any], methods: Sequence[Any], kernels: Sequence[Any], settings: Any, options: Mapping[str, Any]
+) -> str:
+    """Return what makes a report again: a command where all has a name, else the call from Python."""
+    values = [f"{name}={value}" for name, value in settings.items()] if isinstance(settings, Mapping) else settings
+    named = {"method": methods, "kernel": kernels, "set": several(values)}
+    given = {name: value for name, value in options.items() if value}
+    if all(isinstance(each, str | os.PathLike) for each in (*scenes, *methods, *kernels)):
+        words = ["airlight", "report", *map(str, scenes)]
+        words += [word for name, each in named.items() for value in each for word in (f"--{name}", str(value))]
+        for name, value in given.items():
+            words += [f"--{name}"] if value is True else [f"--{name}", str(value)]
+        return shlex.join(words)
+    listed = {"settings" if name == "set" else name: value for name, value in named.items() if value}
+    parts = [_python(scenes)] if scenes else []
+    parts += [f"{name}={_python(value)}" for name, value in (listed | given).items()]
+    return f"airlight.report({', '.join(parts)})"
+
+
+def _python(value: Any) -> str:
+    """Return an argument as one writes it in Python; a function stands there by its name."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_python, value))}]"
+    if callable(value):
+        return str(value.__name__)
+    return repr(os.fspath(value) if isinstance(value, os.PathLike) else value)
 
 
 def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) -> tuple[str, ...]:
@@ -208,7 +239,7 @@ def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) ->
 
 def _redrawn(path: Path, output: Any, figures: str | None, scenes: list[str], labels: list[str]) -> Report:
     """Draw the page of a report again, into its own folder or as a whole report into another, and its figures."""
-    from reference.storage.files import ensure_folder, write_bytes, write_text
+    from reference.storage.files import alone, ensure_folder, write_bytes, write_text
     from reports.data.records import load_report, named_files
     from reports.page.render import render_page
 
@@ -217,11 +248,12 @@ def _redrawn(path: Path, output: Any, figures: str | None, scenes: list[str], la
     data, folder = load_report(path)
     target = ensure_folder(output or folder)
     page = render_page(data, folder)
-    if not target.samefile(folder):
-        for name in ("report.json", *named_files(data)):
-            write_bytes(target / name, (folder / name).read_bytes())
-    write_text(target / "report.html", page)
-    written = _figures(target, figures, scenes, labels) if figures else ()
+    with alone(target):
+        if not target.samefile(folder):
+            for name in ("report.json", *named_files(data)):
+                write_bytes(target / name, (folder / name).read_bytes())
+        write_text(target / "report.html", page)
+        written = _figures(target, figures, scenes, labels) if figures else ()
     return Report(folder=target, data=data, done="drawn again", figures=written)
 
 
@@ -236,6 +268,7 @@ def _measured(
     images: Any,
     fresh: bool,
     cluster: str | None,
+    command: str,
     progress: Any,
 ) -> "records.Report":
     """Measure and write a report; unusable input is refused before the work begins."""
@@ -271,8 +304,6 @@ def _measured(
         works += [frame_work(size, steps=100, frames=TIMED * len(chosen)) for size in sizes]
         check_work("report --images", works)
     gc.freeze()  # modules live as long as the process: what looks for garbage before each frame need not look there
-    typed = shlex.join(["airlight", *sys.argv[1:]])
-    command = typed if progress is True else f"airlight.report(output={str(target)!r}, ..)"
     with ExitStack() as stack, telling(progress, "report") as tell:
         return write_report(
             target,

@@ -148,6 +148,25 @@ def test_from_python_a_function_runs_in_this_process(variant, tmp_path, handed_o
     assert not handed_on["apart"]
 
 
+@pytest.mark.parametrize("progress", [None, True])
+def test_how_to_reproduce_a_report_is_what_made_it(variant, tmp_path, handed_on, progress):
+    """Typed, called from Python by names, and with a function; never the arguments of the process that called."""
+    import shlex
+
+    import airlight
+
+    asked = {"quick": True, "method": "ray-march", "settings": {"steps": 32}, "output": tmp_path / "two words"}
+    airlight.report("open-fog", progress=progress, **asked)
+    words = ["report", "open-fog", "--method", "ray-march", "--set", "steps=32", "--quick", "--output"]
+    assert shlex.split(handed_on["command"]) == ["airlight", *words, str(tmp_path / "two words")]
+    called, measured = handed_on["command"], _measured(handed_on)
+    assert run(shlex.split(called)[1:]) == 0
+    assert (handed_on["command"], _measured(handed_on)) == (called, measured)
+    airlight.report("open-fog", method=["min-max", brighter], output=tmp_path, progress=progress)
+    call = f"airlight.report(['open-fog'], method=['min-max', brighter], output={str(tmp_path)!r})"
+    assert handed_on["command"] == call
+
+
 @pytest.fixture
 def images(tmp_path):
     folder = tmp_path / "engine"
