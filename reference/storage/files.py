@@ -7,6 +7,7 @@ was, and the hidden file beside it, which is removed when it is an hour old and 
 """
 
 import errno
+import fcntl
 import os
 import re
 import shutil
@@ -52,6 +53,27 @@ def ensure_folder(path: str | os.PathLike[str]) -> Path:
             f"cannot write into the folder {folder}: {reason}; give a folder that can be written"
         ) from error
     return folder
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Let no other process write its results into a folder before the block ends.
+
+    The lock is the system's, on the folder itself: it leaves no file, and goes with a process that is killed. Raises
+    InputError if another process is writing there.
+    """
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # some network file systems know no locks
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(
+                    f"output: another run is writing into {folder}; wait until it has ended, or give another folder"
+                ) from None
+        yield
+    finally:
+        os.close(handle)
 
 
 def ensure_writable(path: str | os.PathLike[str]) -> Path:

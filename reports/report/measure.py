@@ -13,7 +13,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +21,18 @@ from analytic.clock import stopwatch
 from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.methods.shader.source import is_shader
-from reference.storage.files import NO_SPACE, ensure_folder
+from reference.storage.files import NO_SPACE, alone, ensure_folder
 from reference.storage.kept import Kept, date, fresh_results
-from reports.data.records import SCHEMA, Environment, Measured, Report, Settings, report_text
+from reports.data.records import (
+    SCHEMA,
+    Environment,
+    Measured,
+    Report,
+    Settings,
+    load_report,
+    named_files,
+    report_text,
+)
 from reports.machine.environment import describe_environment, machine, threads
 from reports.machine.opengl import require_opengl
 from reports.machine.own_process import EndedError, in_own_process
@@ -246,23 +255,36 @@ _STALE = 86400.0  # seconds after which the remains of a killed run are removed
 def staged(target: Path) -> Iterator[Path]:
     """Give a hidden folder in `target` whose files move there when the block ends without an exception.
 
-    Files of the same name are replaced one by one, the page and its data last; others stay. Any exception, a
-    KeyboardInterrupt too, leaves the target as it was; that of a full disk names the target.
+    Files of the same name are replaced one by one, the page and its data last; images that only the report before
+    named go, all else stays. Any exception, a KeyboardInterrupt too, leaves the target as it was; that of a full disk
+    names the target. Raises InputError if another process is writing a report there.
     """
     for left in target.glob(f"{_PREFIX}*"):
         if time.time() - left.stat().st_mtime > _STALE:
             shutil.rmtree(left, ignore_errors=True)
     hidden = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=target))
     try:
-        yield hidden
-        files = [path for path in hidden.rglob("*") if path.is_file()]
-        for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
-            place = target / path.relative_to(hidden)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(path, place)
+        with alone(target):
+            yield hidden
+            _move(hidden, target)
     except OSError as error:
         if error.errno in NO_SPACE:  # what was being written is a name that nobody knows
             raise OSError(error.errno, error.strerror, str(target)) from error
         raise
     finally:
         shutil.rmtree(hidden, ignore_errors=True)
+
+
+def _move(hidden: Path, target: Path) -> None:
+    """Move the files of a hidden folder into the target, and remove the images that only the report before named."""
+    files, before = [path for path in hidden.rglob("*") if path.is_file()], set[Path]()
+    with suppress(InputError):  # there was none, or of another version
+        report, folder = load_report(target)
+        before = {folder / name for name in named_files(report)}
+    for path in sorted(files, key=lambda file: (file.parent == hidden, file)):
+        place = target / path.relative_to(hidden)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(path, place)
+        before.discard(place)
+    for path in before:
+        path.unlink(missing_ok=True)

@@ -14,6 +14,7 @@ from reports.data.records import named_files, read_report, report_text
 from reports.report.measure import staged, write_report
 from reports.report.others import other_parts
 from reports.report.scene import file_stems, folder_of, reference_record
+from tests.helpers.page import small_report, write_report_files
 from tests.helpers.scenes import LAMP, scene_xml
 from validation.study.configuration import Configuration
 from validation.study.study import STUDIES, Checks, Measure, Study, standard_study
@@ -244,6 +245,10 @@ def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
     assert "As the work grows" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def content_names(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
 def content(folder):
     return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
 
@@ -258,6 +263,25 @@ def test_files_appear_when_the_block_ends(tmp_path):
         assert (tmp_path / "report.html").read_text() == "old"
     assert content(tmp_path) == {"report.html": "new", "mine.txt": "mine", "fog/a.exr": "image"}
     assert hidden.exists() is False
+
+
+@pytest.mark.claim("files-whole-or-not-at-all")
+def test_two_reports_never_mix_in_one_folder(tmp_path):
+    """Of two at once the second is refused; of two in turn the images of the first go, and a user's file stays."""
+    folder = write_report_files(tmp_path / "r")
+    (folder / "mine.txt").write_text("mine")
+    images = set(named_files(small_report()))
+    there = set(content_names(folder))
+    assert images < there
+    with staged(folder) as hidden:
+        with pytest.raises(InputError, match=r"another run is writing into .*another folder"), staged(folder):
+            pass
+        (hidden / "report.json").write_text("{}")
+        kept = min(images)
+        (hidden / kept).parent.mkdir(parents=True, exist_ok=True)
+        (hidden / kept).write_text("new")
+    assert set(content_names(folder)) == {*there - images, "report.json", "mine.txt", kept}
+    assert (folder / kept).read_text() == "new"
 
 
 @pytest.mark.claim("files-whole-or-not-at-all")
