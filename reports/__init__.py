@@ -15,6 +15,7 @@ Read in this order:
 - `api/`: the functions of `import airlight` and their results;
 - `studies/`: `airlight study NAME`: a function each, with tables and a figure;
 - `view/`: the live view in the browser;
+- `cluster/`: cells and references by the workers of a Dask cluster;
 - `sweep/`: what a sweep says, from its Parquet;
 - `commands/`: the command line, made of these functions.
 """

@@ -5,7 +5,8 @@ Read in this order:
 
 - `inputs.py`: what the functions take, and the one exception
 - `scenes.py`: scenes as results
-- `results.py`: images and comparisons as results
+- `results.py`: images as results
+- `comparisons.py`: comparisons, diagnoses and fits as results
 - `render.py`: `load_scene`, `render`, and which configurations are asked for
 - `reference.py`: `reference`
 - `compare.py`: `compare`, with `--diagnose` and `--fit`

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from analytic.errors import InputError, named_values
 from reports.api.inputs import (
+    File,
     Files,
     ImageLike,
     Mask,
@@ -43,7 +44,7 @@ def compare(
     all_metrics: bool = False,
     diagnose: bool = False,
     fit: Words | None = None,
-    frames: str | os.PathLike[str] | None = None,
+    frames: File | None = None,
     output: Files = (),
     progress: Progress = None,
 ) -> "ImageComparison | SceneComparison | Fitted | Said":

@@ -142,7 +142,9 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             result.save(path)
         return result if isinstance(result, int) else _printed(result, files, json=json)
 
+    # Both, as cyclopts takes annotations from the function where they have the name of a parameter.
     command.__signature__ = inspect.Signature([*positional, *named])  # type: ignore[attr-defined]
+    command.__annotations__ = {each.name: each.annotation for each in (*positional, *named)}
     return command
 
 

@@ -117,7 +117,8 @@ def require(package: str, extra: str, what: str) -> None:
         importlib.import_module(package)
     except ImportError:
         raise MissingError(
-            f"{what} needs the package {package}: run `./airlight {extra}` or `pip install '.[{extra}]'` in a clone"
+            f"{what} needs the package {package}: `./airlight {extra}` brings it in a clone, "
+            f"`pip install {package}` elsewhere"
         ) from None
 
 

@@ -48,7 +48,9 @@ def require_opengl() -> str:
 def missing(why: str) -> MissingError:
     """Return the exception for a machine without OpenGL: `why` is what the host of shaders says."""
     if "moderngl" in why:
-        return MissingError("shaders need the package moderngl: install it with `pip install '.[shaders]'` in a clone")
+        return MissingError(
+            "shaders need the package moderngl: `./airlight` brings it in a clone, `pip install moderngl` elsewhere"
+        )
     return MissingError(
         f"shaders need OpenGL 4.3, and it does not start ({why}); on Debian: `{_DEBIAN}`; macOS ends at OpenGL 4.1"
     )

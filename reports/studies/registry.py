@@ -22,7 +22,7 @@ ENDINGS = (".csv", ".tex", ".md", ".json", ".pdf", ".png")  #: of the files that
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Study(Said):
-    """The outcome of a study; its data are what `airlight study NAME --json` prints."""
+    """The outcome of a study; its data are what `airlight study NAME -o NAME.json` writes."""
 
     #: A record for each measurement; a mapping where the columns of a study are no record's.
     rows: tuple[Any, ...] = ()

@@ -41,8 +41,12 @@ def noise(
         A built-in scene, random:SEED or a Mitsuba XML file.
     runs
         Number of runs of each method that draws random numbers.
-    method, kernel, settings
-        As in `airlight study methods`.
+    method
+        As in `airlight study methods`; may be given several times.
+    kernel
+        Airlight kernel of the methods; may be given several times.
+    settings
+        NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
     size
         Width and height [pixels], or WxH.
     progress
@@ -157,8 +161,12 @@ def motion(
         Lights that circle, 120 frames a turn (sweep), or that jump after eight frames (step).
     frames
         How many are rendered.
-    method, kernel, settings
+    method
         As in `airlight study methods`; planes, froxels with and without history, a noisy march with it, by default.
+    kernel
+        Airlight kernel of the methods; may be given several times.
+    settings
+        NAME=VALUE, a parameter for each method that `--method` names, or kernel=NAME; may be given several times.
     size
         Width and height [pixels], or WxH.
     progress

@@ -45,7 +45,7 @@ COLUMNS = {
     )
 }
 TARGETS = (0.01, 0.001)  #: relative RMSE for which the fastest method is named
-#: Columns of what `bench` prints.
+#: Columns of what `airlight study methods` prints.
 BENCH = (
     *("label", "frame", "frame_rate", "airlight", "airlight_rate", "light_moved", "memory"),
     *("relative_rmse", "relative_bias", "p99", "max"),

@@ -23,7 +23,9 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def browser():
     """Chromium, without a window; a test is skipped where there is none."""
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser; see the dev extra")
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="playwright drives the browser; see the extra `test`"
+    )
     path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if path is None:
         pytest.skip("no Chromium on this machine; Debian's package is chromium")

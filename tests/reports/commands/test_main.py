@@ -66,9 +66,18 @@ def test_every_command_has_help_that_fits_80_columns(command, capfd, monkeypatch
     assert cli.run([*command, "--help"]) == 0
     printed = capfd.readouterr().out
     assert max(map(len, printed.splitlines())) <= 80
-    assert not re.search(r"<\w+>|\[\[|…|from Python", printed)  # no types of Python, nothing cut off
+    # No types of Python, nothing cut off.
+    assert not re.search(r"<\w+>|\[\[|…|from Python|PATHLIKE|[A-Z]\|[A-Z]", printed)
     assert "Usage: airlight" in printed
     assert "`" not in printed  # code is drawn as code
+
+
+@pytest.mark.claim("documented-commands")
+@pytest.mark.parametrize("words", cli.command_names(), ids=" ".join)
+def test_every_argument_and_option_has_help(words):
+    arguments = [each for each in cli.find_command(words).assemble_argument_collection() if each.parse]
+    assert [each.name for each in arguments if not each.parameter.help] == []
+    assert arguments or words == ("doctor",)
 
 
 @pytest.mark.claim("no-color")

@@ -29,7 +29,7 @@ def test_without_the_extra_one_line_says_what_to_type(monkeypatch, capfd):
     said = capfd.readouterr()
     assert said.err == (
         "airlight: error: the live view needs the package websockets: "
-        "run `./airlight view` or `pip install '.[view]'` in a clone\n"
+        "`./airlight view` brings it in a clone, `pip install websockets` elsewhere\n"
     )
 
 
