@@ -104,7 +104,7 @@ def pixel_grid(width: int, height: int) -> PixelGrid:
 
 
 def sensor_camera(scene, types: ArrayTypes) -> tuple[Camera, Any]:
-    """Return the camera of a Mitsuba scene, and the sensor of which it was read.
+    """Return the camera of a Mitsuba scene, and the sensor from which it was read.
 
     Raises InputError for one that is no pinhole camera in the middle of its film.
     """

@@ -115,7 +115,7 @@ def read_again(known: Scene, scene) -> Scene:
     known
         As `read_scene` returned it.
     scene
-        The `mi.Scene` of which it was read.
+        The `mi.Scene` from which it was read.
 
     Raises
     ------

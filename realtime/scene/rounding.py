@@ -6,8 +6,9 @@ length d moves by sqrt(3) 2^-24 |x|, and the length changes by
 
     2 sqrt(3) 2^-24 max |x|/d.
 
-Airlight goes with 1/d, so it is wrong by the same fraction; a bound of the reference is that of the rounded
-scene. The lengths are those from the camera to each light that has a place, and the size of the whole scene.
+Airlight goes with 1/d, so it is wrong by the same fraction; a bound of the reference holds for the
+rounded scene. The lengths are the distances of the camera from each light that has a place, and the
+size of the whole scene.
 """
 
 from collections.abc import Iterator

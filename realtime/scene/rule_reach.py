@@ -11,7 +11,7 @@ nodes. The longest panel is the one beyond which the two differ by more than `LE
   here, does not matter;
 - in the tangent of the angle at the light from where the panel begins, of `realtime.scene.media.bounded_rays`.
 
-Extinction takes its fraction: each is tried in a vacuum and up to the depth that a panel of its kind may have.
+Each rule is tried without extinction and up to the largest optical depth of a panel of its kind.
 """
 
 import math
@@ -28,7 +28,7 @@ from realtime.numerics.functions import WIDEST, unit_nodes
 Array = NDArray[np.float64]
 
 LEFT = 1e-6  #: of the integral over any panel in v or x
-LEFT_TURN = 1e-5  #: over panels about the light, of whose sums nobody asks more
+LEFT_TURN = 1e-5  #: of the integral over any panel about the light: bounded media promise 1e-5
 PANEL_NODES, PANEL_DEPTH = 8, 10.5  #: of panels in v
 FEW_NODES, FEW_DEPTH = 4, 2.0  #: of short segments
 TURN_NODES, TURN_DEPTH, TANGENT = 4, 2.2, 0.45  #: of panels about the light, and their largest angle
@@ -152,7 +152,9 @@ def _turn_error(value, ends, turn: float) -> float:
 
 
 def angle_scale(e, first, last, sqrt=np.sqrt):
-    """Return d(angle)/dv at E [rad]: the angle at the light, and the v of both lobes; `sqrt` is that of the arrays.
+    """Return d(angle)/dv at E [rad]: the angle at the light, and the v of both lobes.
+
+    `sqrt`: the square root for the arrays, NumPy's or Dr.Jit's.
 
     With E = tan(theta/2 + pi/4), d(theta) = 2 dE/(1 + E^2), and dE = sqrt(E^2 + d^2) dv before a backward lobe.
     """

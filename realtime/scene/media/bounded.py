@@ -47,7 +47,7 @@ class BoundedMedia(Homogeneous):
         return replace(super().rays(origin, direction, aim), crossed=crossed)
 
     def extinction(self, rays, x):
-        """Return that of the medium in which a point lies [1/m]."""
+        """Return the extinction of the medium in which a point lies [1/m]."""
         at = list(self.sigma_t)
         for own, (enter, leave) in zip(self.bounded_media, rays.crossed, strict=True):
             inside = (x >= enter) & (x < leave)
@@ -106,7 +106,7 @@ class BoundedMedia(Homogeneous):
 
     @property
     def unit(self):
-        """Nothing: media differ."""
+        """1: each medium has its own albedo and extinction, which its integral holds."""
         return 1
 
     def part(self, rays, x0, x1, *, uniform):
@@ -168,7 +168,7 @@ class BoundedMedia(Homogeneous):
         pieces = camera_pieces(self, rays)
         if form == "exact" or polynomial is None:
             return BoundedRays(self, light, rays, geometry, kernel, pieces, form)
-        # A polynomial must refuse here, not in a branch. Dr.Jit computes nothing that nobody reads.
+        # A polynomial must refuse here, not in a branch. Dr.Jit computes no value that nobody reads.
         zero = type(geometry.height)(0)
         for own in self.bounded_media:
             segment = ConstantLeg(own.medium.sigma_t[0], zero, own.mean_distance, form == "printed")

@@ -304,7 +304,7 @@ def mesh_airlight(view: View, light: Light, mesh: VolumeMesh, *, kernel):
     """Return the airlight of one light by the triangles of its light volume [W/(m^2 sr)].
 
     `view`: the frame; its rays are those of all pixels of its camera; `light`: the light; `mesh`: its light volume,
-    closed; `kernel`: an airlight kernel function.
+    closed; `kernel`: an airlight kernel.
 
     Valid for homogeneous media that fill all space. The number of crossings is counted on the way: not for a frozen
     function.
