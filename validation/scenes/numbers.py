@@ -34,7 +34,7 @@ _FLATTEST = 1e-9  # of one axis beside another
 def check_numbers(scene: Any) -> None:
     """Refuse an `mi.Scene` with a number that no image can be computed from, by the name of its part.
 
-    So is a scene whose lengths are lost in its coordinates (`realtime.scene.rounding`).
+    A scene whose lengths are lost in its coordinates is refused too (`realtime.scene.rounding`).
     """
     for name, plugin in _plugins(scene):
         parameters = mi.traverse(plugin)
