@@ -23,7 +23,6 @@ from typing import Any
 
 from analytic.errors import InputError
 from realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
-from reference.storage.kept import add_spent
 from reports.machine import quick_compilation
 from reports.machine.environment import child_environment
 
@@ -85,7 +84,7 @@ def _answers(
                 kind, value, loaded = here.recv()
                 if kind == "raised":
                     raise value
-                add_spent(loaded)
+                _add_spent(loaded)
                 if kind == "ended":
                     return
                 if kind == "yields":
@@ -102,6 +101,12 @@ def _answers(
         finally:
             here.close()
             _end(process)
+
+
+def _add_spent(spent: Any) -> None:
+    from reference.storage.kept import add_spent  # loads NumPy
+
+    add_spent(spent)
 
 
 def _end(process: subprocess.Popen) -> None:
