@@ -36,7 +36,7 @@ def _slopes(row: Row) -> dict[str, str]:
     return {name: str(mp.nstr(number, 17)) for name, number in zip(names, numbers, strict=True)}
 
 
-#: What computes the certified cells of a row, by file.
+#: The function that computes the certified cells of a row, by file.
 MAKERS: dict[str, Callable[[Row], dict[str, str]]] = {
     **{name: lambda row: {"value": airlight_integral.value(row)} for name in airlight_integral.FILES},
     "airlight_integral_droplets.csv": _droplets,

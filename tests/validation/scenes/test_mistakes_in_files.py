@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What people give in place of a scene, and mistakes in one, are refused in one line that says what to do."""
+"""Files that people give in place of a scene, and mistakes in one, are refused in one line that says what to do."""
 
 import gzip
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from reference.scene.read import read_reference
 from reference.storage.exr import Image, read_exr, write_exr
 from tests.helpers.bad_inputs import scene
 from validation.scenes.files.camera import clip_notes
+from validation.scenes.files.media import mirrored_grids
 from validation.scenes.loading import load_scene
 
 REFLECTANCE = '<bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf>'
@@ -106,6 +108,15 @@ def test_an_extinction_above_1_goes_into_the_scale(variant, tmp_path):
         (tmp_path / f"{name}.xml").write_text(scene(sigma_t=sigma_t, scale=scale))
         images.append(quadrature_image(read_reference(load_scene(str(tmp_path / f"{name}.xml")).scene), checks=0))
     np.testing.assert_allclose(images[0].airlight, images[1].airlight, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("scale", "noted"), [("-2, 1, 1", True), ("-2, -1, 1", False), ("2, 1, 1", False)])
+def test_a_mirrored_grid_is_noted(variant, scale, noted):
+    place = f'<transform name="to_world"><scale value="{scale}"/></transform></volume>'
+    config = mi.parser.ParserConfig(mi.variant())
+    state = mi.parser.parse_string(config, smoke("smoke.vol").replace("</volume>", place))
+    mi.parser.transform_resolve(config, state)
+    assert bool(mirrored_grids(state)) == noted
 
 
 def test_clip_planes_are_noted_where_they_cut_mitsubas_own_image(variant, tmp_path):

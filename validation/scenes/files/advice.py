@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is wrong with a scene file, by the names of its parts, and what to do about what Mitsuba says of it."""
+"""Mistakes in a scene file, by the names of its parts, and what to do about those that Mitsuba finds."""
 
 import re
 from pathlib import Path

@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
+from reference.scene.transforms import matrix_of
 from validation.arrays import Array
 from validation.scenes.files.nodes import kind, of_kind, properties, references
 
@@ -79,6 +80,23 @@ def grey_densities(state: Any) -> None:
         volumes = {key: properties(state, at).plugin_name() for key, at in references(props)}
         if volumes.get("sigma_t") in ("heightfog", "gridvolume"):
             props["has_spectral_extinction"] = False
+
+
+def mirrored_grids(state: Any) -> list[str]:
+    """Return notes on grids that their to_world mirrors, which are read as Mitsuba reads them."""
+    notes = []
+    for index in of_kind(state, "Medium"):
+        for _, at in references(properties(state, index)):
+            volume = properties(state, at)
+            if volume.plugin_name() != "gridvolume" or "to_world" not in volume:
+                continue
+            mirrored = np.linalg.det(matrix_of(volume["to_world"])[:3, :3]) < 0
+            volume.mark_queried("to_world", False)
+            if mirrored:
+                notes.append(
+                    f"medium '{properties(state, index).id()}': a negative scale in the to_world of its grid mirrors it"
+                )
+    return notes
 
 
 def pass_where_no_material(state: Any) -> None:

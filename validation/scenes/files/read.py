@@ -15,7 +15,7 @@ from reference.storage.scene_digest import description_digest, give_description
 from validation.scenes.changes import give_lobes
 from validation.scenes.files.advice import check_colours, check_files, in_words
 from validation.scenes.files.camera import check_camera, clip_notes
-from validation.scenes.files.media import give_extinction, grey_densities, pass_where_no_material
+from validation.scenes.files.media import give_extinction, grey_densities, mirrored_grids, pass_where_no_material
 from validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
 from validation.scenes.files.references import leave_out_media, touching
 from validation.scenes.files.shapes import cylinders_as_meshes, lamps_as_rectangles, rooms_as_boxes, write_out_instances
@@ -94,7 +94,7 @@ def _mend(state: Any, path: Path) -> None:
     name_nodes(state)
     check_kinds(state)
     check_files(state, path)
-    for note in give_extinction(state):
+    for note in [*give_extinction(state), *mirrored_grids(state)]:
         mi.Log(mi.LogLevel.Warn, note)
     grey_densities(state)
     pass_where_no_material(state)

@@ -66,7 +66,7 @@ def _check_elements(text: bytes, where: str) -> None:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        # Of files that are not well-formed Mitsuba takes some, and says best what is wrong with the others.
+        # Mitsuba takes some files that are not well-formed, and says best what is wrong with the others.
         if not text.startswith(_MARKS) and not _decodes(text):
             raise InputError(
                 f"{where}: line {error.lineno} has bytes that are no UTF-8; expected the encoding that the first line "
