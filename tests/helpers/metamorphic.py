@@ -41,11 +41,11 @@ def lights(scene: Description) -> list[str]:
 
 
 def only(scene: Description, names: Sequence[str]) -> Description:
-    """Return a scene with these lights alone; the shapes of the other area lights stay, and are dark."""
+    """Return a scene with these lights alone; other area lights stay where they are, and send nothing."""
     dark = set(lights(scene)) - set(names)
     kept = {name: part for name, part in scene.items() if name not in dark or "emitter" in part}
     for name in dark & kept.keys():
-        kept[name] = {key: value for key, value in kept[name].items() if key != "emitter"}
+        kept[name] = _brighter(kept[name], 0.0)
     return kept
 
 
