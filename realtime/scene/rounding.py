@@ -76,7 +76,9 @@ def _place(plugin: Any) -> Array:
 
 
 def _worst(scene: Any) -> Rounding | None:
-    """Return the length that the rounding changes most, None without any."""
+    """Return the length that the rounding changes most, None without any or without a camera, which readers refuse."""
+    if not scene.sensors():
+        return None
     camera = _place(scene.sensors()[0])
     lengths = [
         _rounding(f"light '{name}' is {{:.3g}} m from the camera", camera, place) for name, place in _lights(scene)

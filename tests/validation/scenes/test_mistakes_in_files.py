@@ -2,12 +2,15 @@
 """Files that people give in place of a scene, and mistakes in one, are refused in one line that says what to do."""
 
 import gzip
+import re
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from realtime.errors import InputError as MethodsInputError
+from realtime.scene.read_scene import read_scene
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
 from reference.storage.exr import Image, read_exr, write_exr
@@ -41,6 +44,12 @@ MISTAKES = {
     "commas in a colour": (scene(intensity="0,5 0,4 0,3"), "expected decimal points"),
     "commas in a vector": (scene(origin="0,5 -5,0 1,0"), "numbers have decimal points"),
     "a unit": (scene(radius="0.5 m"), "expected a number alone, without a unit"),
+    "a property twice": (
+        scene(extra='<ref name="medium" id="fog"/>').replace(
+            '<float name="fov"', '<float name="fov" value="40"/><float name="fov"'
+        ),
+        "the property is given twice",
+    ),
     "no number": (scene(scale=""), "value of <float> in line 3 is empty; expected a number"),
     "an unset parameter": (scene(radius="$r"), '<default name="r" value="..."/>'),
     "no version": (scene().replace(' version="3.0.0"', ""), 'expected <scene version="3.0.0">'),
@@ -93,6 +102,15 @@ def test_a_mistake_in_a_file_is_one_line_that_says_what_to_do(variant, tmp_path,
         load_scene(str(path))
     assert str(path) in str(refusal.value) or "'" in str(refusal.value)  # the file, or a part by its name
     assert "\n" not in str(refusal.value)
+
+
+def test_a_scene_without_a_camera_is_refused_by_both_readers(variant, tmp_path):
+    sensor = re.compile("<sensor.*?</sensor>", re.DOTALL)
+    (tmp_path / "own.xml").write_text(sensor.sub("", scene()))
+    loaded = load_scene(str(tmp_path / "own.xml")).scene
+    for read in (read_reference, read_scene):
+        with pytest.raises((InputError, MethodsInputError), match="the scene has no camera"):
+            read(loaded)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])

@@ -16,13 +16,19 @@ _PLACE = re.compile(r"\[[\w.]+(:\d+)?\]\s*")  # of Mitsuba's source, before its 
 _ADVICE = (
     (r'could not parse [\w ]*value "[^"]*\d,\d', "expected decimal points, such as 0.12: a comma separates numbers"),
     (r"could not parse integer", "expected a whole number"),
+    (
+        r'could not parse floating point value "[-+]?[\d.]+"',
+        "it is a number: the property is given twice, leave one out",
+    ),
     (r"could not parse floating", "expected a number alone, without a unit"),
     (r"could not parse RGB", "expected one number, or three with commas between them"),
     (
         r"values in vector|exactly 1 or 3 elements|matrix must have",
         "numbers have decimal points, and commas or spaces between them",
     ),
-    (r"invalid lookat", 'it looks along its own up; write another up, for example up="0, 1, 0"'),
+    (r"specified multiple times", "leave one out"),
+    (r"Could not map", "the file that it names is empty: write or copy it again"),
+    (r"invalid lookat", 'it looks along its own up, or at its own place; write another up, for example up="0, 1, 0"'),
     (r"undefined parameter: \$(\w+)", r'give it a value in the file: <default name="\1" value="..."/>'),
     (r"duplicate ID", "expected ids that differ: rename one of both, or leave it out"),
     (r'Plugin "\w+" not found', f"expected a plugin of Mitsuba {mi.__version__}: check the spelling, or replace it"),
@@ -64,6 +70,7 @@ def check_files(state: Any, path: Path) -> None:
         vdb = place.suffix.lower() in (".vdb", ".nvdb")
         if not place.is_file() and not (vdb and plugin == "gridvolume"):
             missing = "does not exist" if place.is_absolute() else f"is not in {path.parent.resolve()}"
+            missing = "is a folder" if place.is_dir() else missing
             slashes = ", with '/' in place of backslashes" * ("\\" in file)
             raise InputError(
                 f"scene {path}: {name} names the file {file}, which {missing}; expected its path from the scene's "
