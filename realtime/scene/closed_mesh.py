@@ -11,9 +11,9 @@ seen from the point,
 
 A mesh is convex if its surface is the one of its convex hull. The depth below the hull, the least
 distance to any of its planes, is concave along a triangle: with the depth d at the centroid and none
-below 0 it is at most 3 d anywhere. The centroids alone therefore decide, to 2e-5 of the size of the body.
-Facets that lie in one plane to the rounding of float32 vertices are one half space: a cube has 6,
-however finely it is divided. The hull merges them (Barber, Dobkin, Huhdanpaa 1996, *The quickhull
+below 0 it is at most 3 d anywhere. The centroids alone therefore decide, to 2e-5 of the size of the
+body. Facets that lie in one plane to the rounding of float32 vertices are one half space: a cube has
+6, however finely it is divided. The hull merges them (Barber, Dobkin, Huhdanpaa 1996, *The quickhull
 algorithm for convex hulls*, ACM Transactions on Mathematical Software 22(4)).
 """
 

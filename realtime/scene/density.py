@@ -57,7 +57,9 @@ class DensityGrid:
 class Density:
     """The density of all clouds of a scene, on the device; one without a grid has the density 1 everywhere."""
 
-    table: Any  #: four numbers a voxel: rho there, at its neighbour in x, in y, and in both
+    #: four numbers a voxel: rho there, at its neighbour in x, in y, and in both. One read of them replaces four: with a
+    #: number a voxel `ray-march` took 2.2 times as long in `smoke` (28 November 2026, two cores, 160 x 120)
+    table: Any
     first: Any  #: by cloud, the number of its first voxel
     counts: tuple[Any, Any, Any]  #: by cloud, voxels along x, y, z
     rows: tuple[Any, ...]  #: by cloud, twelve numbers: from places [m] to voxels, whole numbers at their centres
