@@ -115,6 +115,12 @@ def test_lengths_that_coordinates_lose_are_noted_or_refused(variant, offset, out
     assert "\n" not in str(refusal.value)
 
 
+def test_a_scene_without_a_camera_is_refused_for_that_alone(variant):
+    check_rounding(mi.load_dict(tiny_scene(sensor=None)))
+    with pytest.raises(InputError, match="has no camera"):
+        read(sensor=None)
+
+
 # The camera ----------------------------------------------------------------------------------------------------------
 
 
