@@ -6,6 +6,7 @@ Read in this order:
 - `files.py`: writes a file whole or not at all;
 - `exr.py`: reads and writes layered OpenEXR images;
 - `cache.py`: keeps arrays on disk, within a limit;
-- `kept.py`: keys of results, by arguments and source code;
+- `code.py`: a digest of the code and the data that compute a result;
+- `store.py`: results by a frozen record of their inputs;
 - `scene_digest.py`: a digest of everything in a scene.
 """

@@ -2,7 +2,7 @@
 """Arrays on disk under a key: whole or not there, and together no larger than a limit.
 
 A killed run loses nothing that was finished and leaves nothing half-written. Each file holds a digest of its content
-and its key: a file that was damaged, edited or renamed counts as missing. `reference.storage.kept` says which key
+and its key: a file that was damaged, edited or renamed counts as missing. `reference.storage.store` says which key
 arrays have.
 
 Only files `KIND-DIGEST.npz`, and those in a folder `KIND-DIGEST`, are ever removed: a folder given by mistake loses

@@ -18,11 +18,13 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from reference.storage.store import Content
+
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")
 
-#: Classes of which parameters and `_beside` tell all. Filters of films and samplers count for nothing: no estimator
-#: and no method uses them.
+#: Classes of which parameters and `_beside` tell all. How a film filters and stores pixels, and samplers, count for
+#: nothing: no estimator and no method uses them.
 _WHOLE = {
     *("Scene", "PerspectiveCamera", "HDRFilm", "IndependentSampler", "BoxFilter", "GaussianFilter"),
     *("PointLight", "SpotLight", "DirectionalEmitter", "AreaLight", "ConstantBackgroundEmitter"),
@@ -48,6 +50,11 @@ def scene_digest(scene) -> str | None:
     if not (described or is_whole(scene)):
         return None
     return hashlib.sha256(f"{digest} {described}".encode()).hexdigest()
+
+
+def scene_content(scene) -> Content:
+    """Return a Mitsuba scene as an input of what is cached."""
+    return Content(scene_digest(scene))
 
 
 def build_scene(description: Mapping[str, Any]) -> Any:
@@ -105,13 +112,18 @@ def _beside(scene) -> Iterator[str]:
     """Yield what decides the numbers but is no parameter: which way surfaces face, and which media are where."""
     for sensor in scene.sensors():
         yield _medium_words(sensor.get_medium())
+    for emitter in scene.emitters():
+        yield _medium_words(emitter.get_medium())
     for shape in scene.shapes():
         yield f"{shape.class_name()} {shape.has_flipped_normals()} {shape.bsdf()}"
         yield f"inside {_medium_words(shape.interior_medium())}, outside {_medium_words(shape.exterior_medium())}"
 
 
 def _medium_words(medium: Any) -> str:
-    return "no medium" if medium is None else f"{medium.id()} {medium} {medium.phase_function()}"
+    if medium is None:
+        return "no medium"
+    sampling = f"{medium.has_spectral_extinction()} {medium.use_emitter_sampling()}"
+    return f"{medium.id()} {sampling} {medium} {medium.phase_function()}"
 
 
 def _property_bytes(value: Any) -> bytes:

@@ -418,7 +418,7 @@ def paper(
     InputError
         For an unknown paper.
     """
-    from reference.storage.kept import date
+    from reference.storage.store import date
     from reports.machine.environment import activate, describe_environment
     from reports.report.others import measure_claims
     from reports.tables.papers import count_words, paper_tables

@@ -18,11 +18,11 @@ from analytic.clock import Spent, stopwatch
 from analytic.errors import InputError
 from reference.monte_carlo.batches import Batches
 from reference.quadrature.ray_values import ReferenceImage
-from reference.storage.kept import fresh_results, fresh_since
+from reference.storage.store import fresh_results, fresh_since, is_kept, keep
 from reports.cluster.connect import Client, facts
 from reports.cluster.run import Group, Task, run_groups
 from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
-from validation.estimates.quadrature import reference_image
+from validation.estimates.quadrature import reference_inputs, reference_result
 from validation.scenes.changes import change_words
 from validation.scenes.loading import LoadedScene
 from validation.study.configuration import Configuration
@@ -44,14 +44,14 @@ def image_of(
 def bring_references(cluster: Client, images: Sequence[Cell], **how: Any) -> None:
     """Let workers compute the quadrature references of images that are not in the cache, and keep them here.
 
-    `how`: arguments of `validation.estimates.quadrature.reference_image`.
+    `how`: arguments of `validation.estimates.quadrature.reference_inputs`.
     """
-    lacking = [image for image in images if not reference_image.is_kept(load_cell(image).scene, **how)]
+    lacking = [image for image in images if not is_kept(reference_inputs(load_cell(image).scene, **how).key)]
     named = {f"reference {number}": image for number, image in enumerate(lacking)}
     given = how, fresh_since()
     groups = [Group((Task(name, _reference, (image, *given), _LIMIT),)) for name, image in named.items()]
-    for name, value in _done(cluster, groups):
-        reference_image.keep(*value, load_cell(named[name]).scene, **how)
+    for name, (reference, spent) in _done(cluster, groups):
+        keep(reference_inputs(load_cell(named[name]).scene, **how), reference, spent, ReferenceImage)
 
 
 def _done(cluster: Client, groups: Iterable[Group]) -> Iterator[tuple[str, Any]]:
@@ -96,7 +96,8 @@ def spread(cluster: Client, image: Cell) -> ElsewhereFor:
 
 def _reference(image: Cell, how: Mapping[str, Any], since: float | None) -> tuple[ReferenceImage, Spent]:
     with fresh_results(since):
-        found = reference_image.result(load_cell(image).scene, **how)
+        scene = load_cell(image).scene
+        found = reference_result(scene, reference_inputs(scene, **how))
     return found.value, found.spent
 
 

@@ -6,6 +6,7 @@ A driver beyond `realtime.export.text.CONFORMING` computes other fog than its sh
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from realtime.export.text import kernel_text
 from realtime.methods.shader.client import ShaderHost
 from realtime.scene.phase import named_phase
-from reference.storage.kept import kept
+from reference.storage.store import Inputs, stored
 from validation.certified.files import certified_data
 from validation.kernels.case_files import read_cases
 
@@ -46,10 +47,17 @@ def exported_values(host: ShaderHost, text: str, columns: Sequence[Any]) -> NDAr
     return np.asarray(image[0, :, 0], dtype=np.float64)
 
 
-@kept("shader-driver")
+@dataclass(frozen=True)
+class DriverInputs(Inputs):
+    """The inputs of the error of a driver."""
+
+    kind = "shader-driver"
+    device: str  #: name and version
+
+
 def error_of_device(device: str, *, host: ShaderHost) -> float:
     """Return the `driver_error` of the device of a host, by its name and version."""
-    return driver_error(host)[0]
+    return stored(DriverInputs(device), lambda: driver_error(host)[0], float).value
 
 
 def driver_error(host: ShaderHost, kernel: str = "exact", phase: str = "hg") -> tuple[float, int]:

@@ -21,6 +21,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
+from analytic.clock import Spent
 from analytic.errors import InputError
 from realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
 from reports.machine import quick_compilation
@@ -104,7 +105,7 @@ def _answers(
 
 
 def _add_spent(spent: Any) -> None:
-    from reference.storage.kept import add_spent  # loads NumPy
+    from reference.storage.store import add_spent  # loads NumPy
 
     add_spent(spent)
 
@@ -136,30 +137,31 @@ def main() -> None:
     activate()
     from realtime.errors import InputError as MethodError
     from realtime.errors import NoDriverError
-    from reference.storage.kept import loaded_spent
+    from reference.storage.store import counted
 
     # The user's module sees the command line of the command.
     sys.argv, function, arguments = caller.recv()
 
-    def answer(kind: str, value: Any) -> None:
-        sys.stdout.flush()
-        caller.send((kind, value, loaded_spent() - answered[0]))
-        answered[0] = loaded_spent()
+    with counted() as ledger:
 
-    answered = [loaded_spent()]
-    try:
-        result = function(*arguments)
-        if isinstance(result, Iterator):
-            answer("yields", None)
-            for value in result:
+        def answer(kind: str, value: Any) -> None:
+            sys.stdout.flush()
+            caller.send((kind, value, ledger.loaded))
+            ledger.loaded = Spent()
+
+        try:
+            result = function(*arguments)
+            if isinstance(result, Iterator):
+                answer("yields", None)
+                for value in result:
+                    caller.recv()
+                    answer("value", value)
                 caller.recv()
-                answer("value", value)
-            caller.recv()
-            answer("ended", None)
-        else:
-            answer("value", result)
-    except (InputError, MethodError, MissingError, NoDriverError) as error:
-        answer("raised", type(error)(str(error)))  # its cause may not be one that can be sent
+                answer("ended", None)
+            else:
+                answer("value", result)
+        except (InputError, MethodError, MissingError, NoDriverError) as error:
+            answer("raised", type(error)(str(error)))  # its cause may not be one that can be sent
     _end_group()  # not waiting for what the user's code has started
 
 

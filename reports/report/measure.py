@@ -22,7 +22,7 @@ from analytic.errors import InputError
 from realtime.errors import InputError as MethodError
 from realtime.methods.shader.source import is_shader
 from reference.storage.files import NO_SPACE, alone, ensure_folder
-from reference.storage.kept import Kept, date, fresh_results
+from reference.storage.store import Kept, date, fresh_results
 from reports.data.records import (
     SCHEMA,
     Environment,

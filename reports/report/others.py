@@ -2,13 +2,15 @@
 """The parts of a report that belong to no scene of it: the stability of kernels, how times grow, claims of papers."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from realtime.kernels.registry import KERNELS
 from realtime.methods.shader.source import is_users
-from reference.storage.kept import Kept, KeptFunction, kept, source_digest
+from reference.storage.code import source_digest
+from reference.storage.store import Content, Inputs, Kept, is_kept, stored
 from reports.machine.environment import machine
 from reports.machine.own_process import in_own_process
 from reports.machine.progress import Progress, counted, sharing
@@ -28,51 +30,63 @@ class OtherPart:
     kind: str  #: 'stability', 'scaling' or 'papers'
     title: str  #: shown as the progress
     usual: float  #: roughly what it takes [s]
-    function: KeptFunction[..., Any]
-    given: tuple[Any, ...]  #: what decides its result
+    inputs: Inputs  #: of its result
+    compute: Callable[[Progress], Any]
+    result_type: Any
 
     @property
     def seconds(self) -> float:
         """Expected time [s]."""
-        return 0.0 if self.function.is_kept(*self.given) else self.usual
+        return 0.0 if is_kept(self.inputs.key) else self.usual
 
     def result(self, progress: Progress) -> Kept[Any]:
-        """Return its result, kept or computed."""
-        return self.function.result(*self.given, progress=progress)
+        """Return its result, cached or computed."""
+        return stored(self.inputs, lambda: self.compute(progress), self.result_type)
 
 
 def other_parts(study: Study) -> list[OtherPart]:
     """Return the parts that a study asks for; claims of papers only with all scenes of a study of ours."""
     parts = []
     if study.stability:
-        parts.append(OtherPart("stability", "stability", _STABILITY, _stability, (study.stability, _users_kernels())))
+        parts.append(_stability_part(study.stability))
     if study.growth and set(standard_study("scaling").scenes) <= set(study.scenes):
         usual = standard_study("scaling")
         asked = replace(usual, measure=replace(usual.measure, seconds=study.measure.seconds))
-        parts += [
-            OtherPart("scaling", "how times grow", _GROWTH, _scaling, (k, asked, machine())) for k in study.growth
-        ]
+        parts += [_scaling_part(work, asked) for work in study.growth]
     if study.name in EFFORTS and set(standard_study(study.name).scenes) <= set(study.scenes):
         parts += [_paper(name) for name in experiments_of(claims(), study.name)]
     return parts
 
 
+# The modules of these inputs are those that compute, not the reports that show.
+
+
 # --- kernels ---------------------------------------------------------------------------------------------------------
 
 
-def _users_kernels() -> dict[str, list[str]]:
-    """Return the kernels of the user, with digests of their code."""
-    return {name: user_code(Configuration("", name)) for name in KERNELS if is_users(name)}
+@dataclass(frozen=True)
+class StabilityInputs(Inputs):
+    """The inputs of the stability of kernels."""
+
+    kind = "report-stability"
+    modules = ("validation.kernels.stability",)
+    rays: int
+    added: Mapping[str, tuple[Content, ...]]  #: kernels of the user, with their code
 
 
-@kept("report-stability", "validation.kernels.stability")
-def _stability(rays: int, added: Mapping[str, list[str]], *, progress: Progress) -> list[Stability]:
+def _stability_part(rays: int) -> OtherPart:
+    added = {name: user_code(Configuration("", name)) for name in KERNELS if is_users(name)}
+    compute = partial(_stability, rays, list(added))
+    return OtherPart("stability", "stability", _STABILITY, StabilityInputs(rays, added), compute, list[Stability])
+
+
+def _stability(rays: int, added: list[str], progress: Progress) -> list[Stability]:
     """Return how stable kernels are. Nearly all of its time goes into compilation: a process compiles them quickly."""
     from validation.kernels.stability import stability
 
     how: dict[str, Any] = {"what": "study", "name": "of the kernels", "limit": math.inf, "quick": True}
     known: list[Stability] = in_own_process(known_kernels, rays, **how)
-    return known + (stability(list(added), count=rays, progress=counted(progress)) if added else [])
+    return known + (stability(added, count=rays, progress=counted(progress)) if added else [])
 
 
 def known_kernels(rays: int) -> list[Stability]:
@@ -85,12 +99,27 @@ def known_kernels(rays: int) -> list[Stability]:
 # --- growth ----------------------------------------------------------------------------------------------------------
 
 
-@kept("report-scaling", "validation.study.growth")
-def _scaling(kind: str, study: Study, machine: Mapping[str, str], *, progress: Progress) -> list[Scaling]:
+@dataclass(frozen=True)
+class ScalingInputs(Inputs):
+    """The inputs of how times grow."""
+
+    kind = "report-scaling"
+    modules = ("validation.study.growth",)
+    work: str  #: its kind
+    study: Study
+    machine: Mapping[str, str]
+
+
+def _scaling_part(work: str, study: Study) -> OtherPart:
+    inputs = ScalingInputs(work, study, machine())
+    return OtherPart("scaling", "how times grow", _GROWTH, inputs, partial(_scaling, work, study), list[Scaling])
+
+
+def _scaling(work: str, study: Study, progress: Progress) -> list[Scaling]:
     """Return how times grow with one kind of work."""
     from validation.study.growth import ladder, study_growth
 
-    return study_growth(study, kind, ladder(kind, study.scenes[0], study.sizes[0]), progress=counted(progress))
+    return study_growth(study, work, ladder(work, study.scenes[0], study.sizes[0]), progress=counted(progress))
 
 
 # --- claims of papers ------------------------------------------------------------------------------------------------
@@ -103,17 +132,27 @@ def experiments_of(chosen: Sequence[Claim], effort: str = EFFORTS[-1]) -> list[s
     return [name for name, each in experiments().items() if name in needed and EFFORTS.index(each.effort) <= most]
 
 
+@dataclass(frozen=True)
+class PaperInputs(Inputs):
+    """The inputs of the figures of an experiment."""
+
+    kind = "report-paper"
+    modules = ("validation.papers.claims",)
+    name: str
+    source: str  #: digest of its module, of what that imports and of the data of these
+    machine: Mapping[str, str]
+
+
 def _paper(name: str) -> OtherPart:
     experiment = experiments()[name]
     module = f"validation.papers.{experiment.function.partition(':')[0]}"
-    return OtherPart("papers", name, experiment.seconds, _experiment, (name, source_digest(module), machine()))
+    inputs = PaperInputs(name, source_digest(module), machine())
+    compute = partial(_experiment, name)
+    return OtherPart("papers", name, experiment.seconds, inputs, compute, tuple[str, dict[str, Any]])
 
 
-@kept("report-paper", "validation.papers.claims")
-def _experiment(
-    name: str, source: str, machine: Mapping[str, str], *, progress: Progress
-) -> tuple[str, dict[str, Any]]:
-    """Return the name of an experiment and its figures; `source` is the digest of its module."""
+def _experiment(name: str, progress: Progress) -> tuple[str, dict[str, Any]]:
+    """Return the name of an experiment and its figures."""
     progress(0.0, "claims of papers")
     return name, experiments()[name].run()
 

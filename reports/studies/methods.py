@@ -54,12 +54,12 @@ def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Any, Calla
     """
     from realtime.scene.read_scene import read_scene
     from reports.machine.own_process import in_own_process
-    from validation.estimates.quadrature import reference_image
+    from validation.estimates.quadrature import reference_result
     from validation.study.reference import of_image
     from validation.study.run import run
     from validation.study.study import Cell
 
-    scene, kept = read_scene(loaded.scene), reference_image.result(loaded.scene)
+    scene, kept = read_scene(loaded.scene), reference_result(loaded.scene)
     reference = of_image(kept.value, kept.spent)
     path, elsewhere = str(loaded.path or loaded.name), in_own_process if apart else None
 

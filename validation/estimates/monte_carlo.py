@@ -30,7 +30,8 @@ from reference.scene.clouds import read_clouds
 from reference.scene.read import read_reference
 from reference.storage.cache import cache_folder
 from reference.storage.files import NO_SPACE
-from reference.storage.kept import add_spent, drop, is_damaged, is_kept, key_of, load, stopwatch_from_nothing, store
+from reference.storage.scene_digest import scene_content
+from reference.storage.store import Content, Inputs, add_spent, counted, drop, is_damaged, is_kept, load, store
 from validation.arrays import Counted
 from validation.estimates.quadrature import check_camera, check_rays
 
@@ -54,6 +55,42 @@ class Run:
 Elsewhere = tuple[Callable[[list[int]], Iterator[tuple[Batches, Spent]]], int]
 #: Estimator, samples a batch, and their counts by pixel or None -> who traces such batches.
 ElsewhereFor = Callable[[str, int, NDArray[np.integer] | None], Elsewhere]
+
+
+@dataclass(frozen=True)
+class BatchInputs(Inputs):
+    """The inputs of the batches of an estimator, beside their seeds."""
+
+    scene: Content
+    samples: int  #: a pixel in each batch
+    max_depth: int
+    orders: tuple[str, ...] | None
+    counts: NDArray[np.integer] | None
+
+
+# The modules are those of the estimators alone: what is here hands these inputs on as they are.
+class SingleScatterInputs(BatchInputs):
+    """The inputs of batches by `single-scatter`."""
+
+    kind = "single-scatter"
+    modules = ("reference.monte_carlo.single_scatter.integrator",)
+
+
+class VolpathInputs(BatchInputs):
+    """The inputs of batches by `volpath`."""
+
+    kind = "volpath"
+    modules = ("reference.monte_carlo.volpath",)
+
+
+class CloudPathInputs(BatchInputs):
+    """The inputs of batches by `cloud-paths`."""
+
+    kind = "cloud-paths"
+    modules = ("reference.monte_carlo.cloud_paths.integrator",)
+
+
+_INPUTS = {each.kind: each for each in (SingleScatterInputs, VolpathInputs, CloudPathInputs)}
 
 
 def monte_carlo_batches(
@@ -96,10 +133,7 @@ def monte_carlo_batches(
         raise InputError(
             f"seed: got {first_seed} for {batches} batches, which count up; expected 0 to {LARGEST_SEED - batches}"
         )
-    settings = {"samples": samples, "max_depth": max_depth, "orders": orders, "counts": counts}
-    function = {"single-scatter": single_scatter_batch, "cloud-paths": cloud_paths_batch}.get(estimator, volpath_batch)
-    function = volpath_orders_batch if estimator == "volpath" and orders is not None else function
-    folder = key_of(estimator, function, scene=scene, **settings)
+    folder = _INPUTS[estimator](scene_content(scene), samples, max_depth, orders, counts).key
     layers, trace = batch_tracer(scene, estimator, samples=samples, max_depth=max_depth, counts=counts, orders=orders)
     tally: Counter[str] = Counter()
 
@@ -205,18 +239,20 @@ def _block(
     batch_of: Callable[[int], Batches | None],
 ) -> tuple[Batches | None, bool]:
     """Return the batches of some seeds added up, and whether they are all there."""
-    full, spent = len(seeds) == BLOCK, stopwatch_from_nothing()
+    full = len(seeds) == BLOCK
     block = _load(folder, seeds, samples, layers, tally) if full else None
     if block is not None:
         tally["done"] += BLOCK
         return block, True
-    for seed in seeds:
-        batch = batch_of(seed)
-        if batch is None:
-            return block, False
-        block = batch if block is None else merged(block, batch)
+    with counted() as ledger:
+        for seed in seeds:
+            batch = batch_of(seed)
+            if batch is None:
+                return block, False
+            block = batch if block is None else merged(block, batch)
+        spent = ledger.spent()
     if full and block is not None:
-        _store(folder, block, spent())
+        _store(folder, block, spent)
         for seed in seeds:
             drop(_name(folder, range(seed, seed + 1)))
     return block, True

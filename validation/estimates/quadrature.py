@@ -24,7 +24,7 @@ How near is on the ray? Mitsuba holds positions as float32 numbers, the largest 
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,37 +40,65 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.convex_bounds import holds
 from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
 from reference.storage.exr import TOTAL
-from reference.storage.kept import kept, load, store
+from reference.storage.scene_digest import scene_content
+from reference.storage.store import Content, Inputs, Kept, load, store, stored
 from validation.arrays import Array, Bools, Counted
 from validation.statistics.estimate import UNKNOWN, Estimate, Kind
 
 _ROUNDING = 2.0**-24
 
 
-@kept("quadrature")
-def reference_image(
-    scene,
-    checks: int = 32,
-    shadow_scale: float = 1.0,
-    pixel: str = "centre",
-    points: int | None = None,
-    *,
-    progress: Counted | None = None,
-) -> ReferenceImage:
-    """Return the quadrature reference of a Mitsuba scene at its own size, (height, width, 3) [W/(m^2 sr)].
+@dataclass(frozen=True)
+class ReferenceInputs(Inputs):
+    """The inputs of the quadrature reference of a scene at its own size."""
 
-    `checks`, `shadow_scale`, `pixel` and `progress` are those of `reference.quadrature.image.quadrature_image`;
-    `points`: samples of area lights of each replicate, the same for all pixels, None for as many as their error needs.
-    Radiance that is not finite is refused.
+    kind = "quadrature"
+    scene: Content
+    checks: int = 32  #: see `reference.quadrature.image.quadrature_image`
+    shadow_scale: float = 1.0  #: the same
+    pixel: str = "centre"  #: the same
+    points: int | None = None  #: samples of area lights of each replicate; None for as many as their error needs
+
+
+def reference_inputs(scene, **settings: Any) -> ReferenceInputs:
+    """Return the inputs of the reference of an `mi.Scene`, `settings` by the names of `ReferenceInputs`."""
+    return ReferenceInputs(scene_content(scene), **settings)
+
+
+def reference_result(
+    scene, inputs: ReferenceInputs | None = None, *, progress: Counted | None = None
+) -> Kept[ReferenceImage]:
+    """Return the quadrature reference of an `mi.Scene`, and what it took, from the cache or computed now.
+
+    `inputs`: of this scene, with the settings of `reference_inputs`; by default with its defaults.
+
+    Raises InputError for radiance that is not finite.
     """
-    reference = read_reference(scene)
-    settings: dict[str, Any] = {"checks": checks, "shadow_scale": shadow_scale, "pixel": pixel}
+    asked = inputs or reference_inputs(scene)
+    return stored(asked, lambda: _computed(scene, asked, progress), ReferenceImage)
+
+
+def reference_image(scene, *, progress: Counted | None = None, **settings: Any) -> ReferenceImage:
+    """Return the quadrature reference of an `mi.Scene` at its own size, (height, width, 3) [W/(m^2 sr)].
+
+    `settings`: by the names of `ReferenceInputs`.
+
+    Raises InputError for radiance that is not finite.
+    """
+    return reference_result(scene, reference_inputs(scene, **settings), progress=progress).value
+
+
+def _computed(scene, inputs: ReferenceInputs, progress: Counted | None) -> ReferenceImage:
+    reference, points = read_reference(scene), inputs.points
     # Only area lights take so long that a run is worth going on with.
-    keep = None
-    if reference.area and pixel == "centre":
-        keep = _parts(reference_image.key(scene, **settings, points=points))
-    plan = PointPlan(error=0.0, first=points, most=points) if points else None
-    return _checked_image(reference, {**settings, "plan": plan}, keep=keep, progress=progress)
+    keep = _parts(inputs.key) if reference.area and inputs.pixel == "centre" else None
+    settings = {
+        "checks": inputs.checks,
+        "shadow_scale": inputs.shadow_scale,
+        "pixel": inputs.pixel,
+        "plan": PointPlan(error=0.0, first=points, most=points) if points else None,
+    }
+    return _checked_image(reference, settings, keep=keep, progress=progress)
 
 
 def reference_of_pixels(scene, pixels: NDArray[np.integer], plan: PointPlan | None = None) -> ReferenceImage:

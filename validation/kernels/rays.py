@@ -12,13 +12,13 @@ Two sets, each the same on every machine:
   J(c lengths, sigma_t / c) = J / c.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import qmc
 
 from analytic.phase import PHASE_NAMES
-from reference.storage.kept import kept
+from reference.storage.store import Inputs, stored
 from validation.arrays import Array
 from validation.kernels.case_files import Cases, integrate_cases
 from validation.kernels.cases import TABLE
@@ -30,6 +30,14 @@ _G = (
     np.linspace(-0.95, 0.95, 39).astype(np.float32).astype(np.float64)
 )  # few, since the reference takes one g at a time
 _LARGEST_SOBOL = 1 << 20
+
+
+@dataclass(frozen=True)
+class RayInputs(Inputs):
+    """The inputs of the integrals of rays."""
+
+    kind = "kernel-rays"
+    cases: Cases
 
 
 def hard_rays(count: int = 100_000) -> Cases:
@@ -84,7 +92,8 @@ def table(phase, g, *, foot: Array, height: Array, x0: Array, x1: Array, sigma_t
 
 def with_reference(cases: Cases) -> Cases:
     """Return cases with J to about 1e-12, from the cache where it was computed before."""
-    return replace(cases, value=_reference(cases))
+    inputs = RayInputs(cases)
+    return replace(cases, value=stored(inputs, lambda: integrate_cases(cases, rtol=1e-12, table=TABLE)[0], Array).value)
 
 
 def case_row(cases: Cases, k: int) -> str:
@@ -95,11 +104,6 @@ def case_row(cases: Cases, k: int) -> str:
     value = "" if cases.value is None else repr(float(cases.value[k]))
     words = [repr(float(column[k])) for column in numbers]
     return ",".join([cases.tag[k] if cases.tag else "", cases.phase[k], *words, value])
-
-
-@kept("kernel-rays")
-def _reference(cases: Cases) -> Array:
-    return integrate_cases(cases, rtol=1e-12, table=TABLE)[0]
 
 
 def _sobol(count: int, dimensions: int) -> Array:

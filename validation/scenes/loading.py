@@ -15,7 +15,7 @@ from typing import Any
 import mitsuba as mi
 
 from analytic.errors import InputError, nearest
-from reference.storage.kept import source_digest
+from reference.storage.code import source_digest
 from reference.storage.scene_digest import give_description, is_whole, scene_digest
 from validation.scenes.bodies import check_bodies
 from validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes

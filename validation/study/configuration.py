@@ -6,7 +6,6 @@ A kernel is named 'quadrature', 'quadrature-32', or as a user's 'module:function
 
 import hashlib
 import sys
-import time
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +23,8 @@ from realtime.methods.shader.source import is_shader, is_users, read_shader
 from realtime.methods.user_method import method_file, user_errors, user_object
 from realtime.parameters import values
 from realtime.scene.read_scene import Scene
-from reference.storage.kept import code_digest
+from reference.storage.code import code_digest
+from reference.storage.store import Content
 from validation.study.cost import TIMED, Work, frame_work
 
 
@@ -204,17 +204,18 @@ def _imported(name: str) -> Kernel:
     return Kernel(name, guarded)
 
 
-def user_code(chosen: Configuration) -> list[str]:
+def user_code(chosen: Configuration) -> tuple[Content, ...]:
     """Return digests of the user's code in a configuration, with the modules of its folder that it imports."""
-    return [_user_digest(name) for name in (chosen.method, chosen.kernel) if name is not None and is_users(name)]
+    names = [name for name in (chosen.method, chosen.kernel) if name is not None and is_users(name)]
+    return tuple(Content(_user_digest(name)) for name in names)
 
 
-def _user_digest(name: str) -> str:
+def _user_digest(name: str) -> str | None:
     if is_shader(name):
         digest = hashlib.sha256()
         for each in read_shader(Path(name)).files:
             digest.update(each.read_bytes() + bytes(1))
         return digest.hexdigest()
     file = method_file(name)
-    # A function typed into a notebook has no file, so its results cannot be kept.
-    return code_digest([file]) if file is not None and file.is_file() else f"no file, {time.time_ns()}"
+    # A function typed into a notebook has no file, so its results cannot be cached.
+    return code_digest([file]) if file is not None and file.is_file() else None

@@ -2,19 +2,21 @@
 """Keys of rows, and what workers that compute them must agree in."""
 
 import platform
+import uuid
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 
-from reference.storage.kept import key_of, source_digest
+from reference.storage.code import source_digest
+from reference.storage.store import Content, Inputs
 from validation.properties.properties import scene_properties
 from validation.scenes.loading import scene_identity
 from validation.scenes.random.design import is_random
 from validation.scenes.registry import SCENES
-from validation.study.configuration import user_code
+from validation.study.configuration import Configuration, user_code
 from validation.study.reference import cell_reference
 from validation.study.run import run
-from validation.study.study import Cell
+from validation.study.study import Cell, Measure
 
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
 
@@ -53,22 +55,41 @@ def row_source() -> str:
     return source_digest(run, cell_reference, scene_properties)
 
 
+@dataclass(frozen=True)
+class CellReference:
+    """The inputs of the reference of a cell, known before its scene is loaded; its code is in `Made.source`."""
+
+    scene: str  #: see `scene_identity`
+    size: tuple[int, int]  #: [pixels]
+    medium: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RowInputs(Inputs):
+    """The inputs of a row of a sweep."""
+
+    kind = "row"
+    modules = ("validation.study.keys",)
+    reference: CellReference
+    chosen: Configuration
+    code: tuple[Content, ...]  #: of the user's in the configuration
+    measure: Measure
+    airlight: str  #: version
+    source: str  #: see `row_source`
+    packages: tuple[tuple[str, str], ...]
+    variant: str  #: Mitsuba's
+
+
 def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) -> str:
-    """Return the key of the row of a cell that these versions compute.
+    """Return the key of the row of a cell that these versions compute; one that is never found again if it has none.
 
     `scenes` are digests of scenes that were read before, by name: anyone who has many cells of a file reads it once.
     """
-    key = key_of(
-        "row",
-        scene=(scenes or {}).get(cell.scene) or scene_identity(cell.scene),
-        size=cell.size,
-        medium=cell.medium,
-        method=[cell.chosen.method, cell.chosen.kernel, sorted(cell.chosen.parameters), user_code(cell.chosen)],
-        measure=cell.measure,
-        made=[made.airlight, made.source, made.packages, made.variant],
-    )
-    assert key is not None, "the identity of a scene is a word"
-    return key
+    chosen = replace(cell.chosen, parameters=tuple(sorted(cell.chosen.parameters)))
+    reference = CellReference((scenes or {}).get(cell.scene) or scene_identity(cell.scene), cell.size, cell.medium)
+    versions = made.airlight, made.source, made.packages, made.variant
+    inputs = RowInputs(reference, chosen, user_code(cell.chosen), cell.measure, *versions)
+    return inputs.key or f"row-{uuid.uuid4().hex}"
 
 
 def scene_identities(scenes: Iterable[str]) -> dict[str, str]:

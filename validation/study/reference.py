@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from analytic.clock import Spent
 from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import PointPlan
-from reference.storage.kept import kept
+from reference.storage.scene_digest import scene_content
+from reference.storage.store import Content, Inputs, stored
 from validation.arrays import Array
-from validation.estimates.quadrature import reference_image, reference_of_pixels
+from validation.estimates.quadrature import reference_of_pixels, reference_result
 from validation.metrics.errors import FLOOR
 from validation.scenes.changes import parse_changes
 from validation.scenes.loading import LoadedScene, load_scene
@@ -85,14 +86,22 @@ def load_cell(cell: Cell) -> LoadedScene:
 def cell_reference(loaded: LoadedScene) -> Reference:
     """Return the reference of a loaded scene, from the cache where it was computed before."""
     if not any(emitter.get_shape() is not None for emitter in loaded.scene.emitters()):
-        whole = reference_image.result(loaded.scene)
+        whole = reference_result(loaded.scene)
         return of_image(whole.value, whole.spent)
-    result = sampled_reference.result(loaded.scene)
+    inputs = SampledInputs(scene_content(loaded.scene))
+    result = stored(inputs, lambda: sampled_reference(loaded.scene), dict[str, NDArray[Any]])
     some = result.value
     return Reference(some["airlight"], some["bound"], None, some["mask"], None, result.spent)
 
 
-@kept("sweep-reference")
+@dataclass(frozen=True)
+class SampledInputs(Inputs):
+    """The inputs of the reference of some pixels of a scene with area lights."""
+
+    kind = "sweep-reference"
+    scene: Content
+
+
 def sampled_reference(scene) -> dict[str, NDArray[Any]]:
     """Return airlight, its bound and the mask of the pixels that have one, of an `mi.Scene`."""
     width, height = scene.sensors()[0].film().size()

@@ -6,14 +6,14 @@ nothing changed computes nothing. Errors are kept by configuration. Times are ke
 configurations together: they are compared with one another, and are of one run (`validation.study.turns`).
 """
 
-import hashlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,14 +23,14 @@ from analytic.clock import Spent
 from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
 from reference.quadrature.ray_values import ReferenceImage
 from reference.storage.exr import TOTAL, Image
-from reference.storage.kept import Kept, kept
-from reference.storage.scene_digest import scene_digest
+from reference.storage.scene_digest import scene_content, scene_digest
+from reference.storage.store import Content, Inputs, Kept, is_kept, stored
 from validation.arrays import Array
 from validation.columns import record_of
 from validation.estimates.agreement import agreements
 from validation.estimates.monte_carlo import ElsewhereFor
 from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.estimates.quadrature import reference_image
+from validation.estimates.quadrature import ReferenceInputs, reference_image, reference_inputs, reference_result
 from validation.metrics.flip import Flip, flip_hdr
 from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
 from validation.statistics.records import Agreement, MultipleScattering
@@ -41,7 +41,7 @@ from validation.study.row import Row
 from validation.study.run import cell_row, layered_frame, run, with_times
 from validation.study.study import Cell, Checks, Study
 from validation.study.turns import Apart, CellTimes, time_cells
-from validation.timing import FrameTimes
+from validation.timing import FrameTimes, Timing
 
 if TYPE_CHECKING:  # what only reports of images need is imported there
     from validation.engine.images import EngineImage
@@ -82,7 +82,7 @@ class SceneStudy:
     @cached_property
     def kept_reference(self) -> Kept[ReferenceImage]:
         """The quadrature reference at pixel centres, and what it took."""
-        return reference_image.result(self.loaded.scene, points=self.study.points)
+        return reference_result(self.loaded.scene, self.reference_inputs)
 
     @property
     def reference(self) -> ReferenceImage:
@@ -137,53 +137,112 @@ class SceneStudy:
         """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
         lights = len(self.scene.lights) + 16 * len(self.scene.area_lights)
         checks, parts = self.study.checks, dict[str, float]()
-        kept = reference_image.is_kept(self.loaded.scene, points=self.study.points)
-        parts["reference"] = 0.0 if kept else reference_work(self.size, lights=lights).seconds
+        known = is_kept(self.reference_inputs.key)
+        parts["reference"] = 0.0 if known else reference_work(self.size, lights=lights).seconds
         with self.at(checks.size) as scene:
-            kept = check_reference.is_kept(scene, checks, self.study.points)
-        parts["checks"] = 0.0 if kept else len(checks.margins) * (checks.patience or 60.0)
+            known = is_kept(CheckInputs(scene_content(scene), checks, self.study.points).key)
+        parts["checks"] = 0.0 if known else len(checks.margins) * (checks.patience or 60.0)
         batches, samples = checks.multiple
         with self.at(_MULTIPLE) as scene:
-            kept = multiple_scattering.is_kept(scene, batches, samples)
-        parts["multiple scattering"] = 0.0 if kept else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
+            known = is_kept(MultipleInputs(scene_content(scene), batches, samples).key)
+        parts["multiple scattering"] = 0.0 if known else _seconds(sampled_work(_MULTIPLE, 20 * batches * samples))
         for chosen in self.configurations:
-            kept = measured.is_kept(*self.given(chosen))
-            parts[chosen.label] = 0.0 if kept else _seconds(configuration_work(self.scene, chosen, frames=1))
+            known = is_kept(self.inputs(chosen).key)
+            parts[chosen.label] = 0.0 if known else _seconds(configuration_work(self.scene, chosen, frames=1))
         works = [configuration_work(self.timed, chosen) for chosen in self.configurations]
-        together = self.timed_together
-        known = together is None or scene_times.is_kept(*together)
+        known = self.times_inputs is None or is_kept(self.times_inputs.key)
         parts["times"] = 0.0 if known else sum(map(_seconds, works))
         return parts
 
-    @property
-    def reference_key(self) -> str | None:
-        """The key of the reference, which is part of the keys of all that is compared with it."""
-        return reference_image.key(self.loaded.scene, points=self.study.points)
+    @cached_property
+    def reference_inputs(self) -> ReferenceInputs:
+        """The inputs of the reference, which are among those of all that is compared with it."""
+        return reference_inputs(self.loaded.scene, points=self.study.points)
 
-    def given(self, chosen: Configuration) -> tuple[Cell, str | None, list[str], Mapping[str, str]]:
-        """Return the inputs that decide the row and the image of a configuration."""
+    def inputs(self, chosen: Configuration) -> "CellInputs":
+        """Return the inputs of the row and the image of a configuration, without its times."""
         # How long frames are timed, and at which size, decides no error.
         measure = self.study.measure
         times = "stages" if measure.times == "stages" else "none"
         errors = replace(measure, times=times, seconds=0.0, slow=None, timed_size=None)
         cell = replace(self.cell(chosen), scene=self.identity, measure=errors)
-        return cell, self.reference_key, user_code(chosen), self.machine
+        return CellInputs(self.reference_inputs, cell, user_code(chosen), self.machine)
 
-    def given_image(self, shown: "EngineImage", digest: str, times: Any) -> tuple[Any, ...]:
-        """Return the inputs that decide the row of an image, from the digest of its file and its times."""
-        return self.identity, self.reference_key, self.size, shown.label, shown.path.name, digest, times
-
-    @property
-    def timed_together(self) -> tuple[list[Cell], list[list[str]], Mapping[str, str]] | None:
-        """The inputs that decide which times are of one run; None where nothing is timed."""
+    @cached_property
+    def times_inputs(self) -> "TimesInputs | None":
+        """The inputs of the times that are of one run; None where nothing is timed."""
         if self.study.measure.times == "none" or not self.configurations:
             return None
-        cells = [self.timed_cell(chosen, self.identity) for chosen in self.configurations]
-        return cells, [user_code(chosen) for chosen in self.configurations], self.machine
+        cells = tuple(self.timed_cell(chosen, self.identity) for chosen in self.configurations)
+        return TimesInputs(cells, tuple(map(user_code, self.configurations)), self.machine)
 
     def timed_cell(self, chosen: Configuration, scene: str) -> Cell:
         """Return the cell of a configuration at the size of timed frames; `scene`: its name or identity."""
         return replace(self.cell(chosen), scene=scene, size=self.timed_size)
+
+
+@dataclass(frozen=True)
+class CheckInputs(Inputs):
+    """The inputs of the checks of a reference."""
+
+    kind = "scene-checks"
+    scene: Content
+    checks: Checks
+    points: int | None  #: of area lights in the reference
+
+
+@dataclass(frozen=True)
+class MultipleInputs(Inputs):
+    """The inputs of the fraction of multiple scattering."""
+
+    kind = "scene-multiple"
+    scene: Content
+    batches: int
+    samples: int
+
+
+@dataclass(frozen=True)
+class CellInputs(Inputs):
+    """The inputs of the row and the image of a configuration."""
+
+    kind = "cell"
+    reference: ReferenceInputs
+    cell: Cell  #: with the identity of its scene
+    code: tuple[Content, ...]  #: of the user's in it
+    machine: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class TimesInputs(Inputs):
+    """The inputs of the times of all configurations of a scene, which are of one run."""
+
+    kind = "scene-times"
+    cells: tuple[Cell, ...]  #: with the identity of their scene, at the size of timed frames
+    code: tuple[tuple[Content, ...], ...]  #: of the user's in each
+    machine: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class FlipInputs(Inputs):
+    """The inputs of HDR-FLIP."""
+
+    kind = "flip"
+    reference: Array  #: (height, width, 3) [W/(m^2 sr)]
+    test: Array  #: of the same shape
+    version: str  #: of its program
+
+
+@dataclass(frozen=True)
+class ImageInputs(Inputs):
+    """The inputs of the row of an image from elsewhere."""
+
+    kind = "scene-image"
+    reference: ReferenceInputs
+    scene: str  #: its identity
+    size: tuple[int, int]  #: [pixels]
+    label: str
+    path: Path  #: which counts by its name and its content
+    times: tuple[Timing, str] | None
 
 
 def _seconds(work: Work) -> float:
@@ -247,18 +306,18 @@ def study_scene(
     reference, checks = study.kept_reference, study.study.checks
     progress("checks")
     with study.at(checks.size) as scene:
-        agreement = check_reference.result(scene, checks, study.study.points, spread=spread)
+        agreement = check_reference(scene, checks, study.study.points, spread=spread)
     progress("multiple scattering")
     with study.at(_MULTIPLE) as scene:
-        multiple = multiple_scattering.result(scene, *checks.multiple)
+        multiple = multiple_scattering(scene, *checks.multiple)
     rows = []
     for chosen in study.configurations:
         progress(chosen.label)
         rows.append(_row(study, chosen, apart, ended or {}))
     progress("times")
-    together, timings = study.timed_together, list[Kept[Any]]()
-    if together is not None:
-        timings.append(scene_times.result(*together, study=study, rows=[judged.row for judged in rows], apart=apart))
+    timings = list[Kept[Any]]()
+    if study.times_inputs is not None:
+        timings.append(scene_times(study, study.times_inputs, [judged.row for judged in rows], apart))
         rows = [
             replace(each, row=with_times(each.row, found)) for each, found in zip(rows, timings[0].value, strict=True)
         ]
@@ -286,57 +345,62 @@ def configurations_for(features: SceneFeatures, configurations: Sequence[Configu
     return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
 
 
-@kept("scene-checks")
 def check_reference(
     scene, checks: Checks, points: int | None = None, *, spread: ElsewhereFor | None = None
-) -> dict[str, Agreement]:
+) -> Kept[dict[str, Agreement]]:
     """Compare the reference with the Monte Carlo estimators; see `validation.estimates.agreement.agreements`."""
-    return agreements(
-        scene,
-        checks.margins,
-        batches=checks.batches,
-        samples=checks.samples,
-        seconds=checks.patience,
-        points=points,
-        spread=spread,
-    )
+
+    def compute() -> dict[str, Agreement]:
+        return agreements(
+            scene,
+            checks.margins,
+            batches=checks.batches,
+            samples=checks.samples,
+            seconds=checks.patience,
+            points=points,
+            spread=spread,
+        )
+
+    return stored(CheckInputs(scene_content(scene), checks, points), compute, dict[str, Agreement])
 
 
-@kept("scene-multiple")
-def multiple_scattering(scene, batches: int, samples: int) -> MultipleScattering:
+def multiple_scattering(scene, batches: int, samples: int) -> Kept[MultipleScattering]:
     """Return the fraction of multiple scattering; see `validation.estimates.multiple_scattering`."""
-    return multiple_scattering_fraction(scene, batches=batches, samples=samples)
+    inputs = MultipleInputs(scene_content(scene), batches, samples)
+    compute = partial(multiple_scattering_fraction, scene, batches=batches, samples=samples)
+    return stored(inputs, compute, MultipleScattering)
 
 
-# A fault of the user's method may have gone by the next run.
-@kept("cell", worth=lambda found: found.row.kind == "built-in" or found.row.status == "done")
-def measured(
-    cell: Cell,
-    reference_key: str | None,
-    code: list[str],
-    machine: Mapping[str, str],
-    *,
-    study: SceneStudy,
-    apart: Apart | None,
-) -> Judged:
-    """Return the row and the image of a cell, whose scene is an identity; `code` is that of the user in it."""
-    asked, kept = replace(cell, scene=study.path), study.kept_reference
-    row, frame = run(asked, study.scene, of_image(kept.value, kept.spent), apart=apart)
-    row = record_of(row, Row)  # without numbers that are not finite
-    return Judged(row, None if frame is None else layered_frame(study.name, cell.chosen, frame))
+def measured(study: SceneStudy, chosen: Configuration, apart: Apart | None) -> Kept[Judged]:
+    """Return the row and the image of a configuration."""
+    inputs = study.inputs(chosen)
+
+    def compute() -> Judged:
+        reference = of_image(study.kept_reference.value, study.kept_reference.spent)
+        row, frame = run(replace(inputs.cell, scene=study.path), study.scene, reference, apart=apart)
+        row = record_of(row, Row)  # without numbers that are not finite
+        return Judged(row, None if frame is None else layered_frame(study.name, chosen, frame))
+
+    return stored(inputs, compute, Judged, _is_worth)
 
 
-@kept("scene-times", worth=lambda found: not any(each.lost for each in found))
+def _is_worth(judged: Judged) -> bool:
+    """Return whether a row is to be cached: a fault of the user's method may have gone by the next run."""
+    return judged.row.kind == "built-in" or judged.row.status == "done"
+
+
 def scene_times(
-    asked: list[Cell],
-    code: list[list[str]],
-    machine: Mapping[str, str],
-    *,
-    study: SceneStudy,
-    rows: Sequence[Row],
-    apart: Apart | None,
-) -> list[CellTimes]:
+    study: SceneStudy, inputs: TimesInputs, rows: Sequence[Row], apart: Apart | None
+) -> Kept[list[CellTimes]]:
     """Return the times of all cells of a scene, of one run; `rows`: what came of them, as not all can be timed."""
+    return stored(inputs, partial(_scene_times, study, rows, apart), list[CellTimes], _all_timed)
+
+
+def _all_timed(timings: Sequence[CellTimes]) -> bool:
+    return not any(each.lost for each in timings)
+
+
+def _scene_times(study: SceneStudy, rows: Sequence[Row], apart: Apart | None) -> list[CellTimes]:
     cells = []
     for chosen, row in zip(study.configurations, rows, strict=True):
         cell = study.timed_cell(chosen, study.path)
@@ -353,58 +417,50 @@ def _row(study: SceneStudy, chosen: Configuration, apart: Apart | None, ended: M
         row = cell_row(study.cell(chosen), status="refused", reason=ended[chosen])
         return Judged(row, results=(Kept(row, Spent(), time.time(), False),))
     reference = study.reference  # loaded or computed now: it is no part of the time of a configuration
-    result = measured.result(*study.given(chosen), study=study, apart=apart)
-    judged = replace(result.value, results=(result,))
+    result = measured(study, chosen, apart)
+    # The same scene may have been measured under another path.
+    here = cell_row(study.cell(chosen))
+    row = replace(result.value.row, scene=here.scene, command=here.command)
+    judged = replace(result.value, row=row, results=(result,))
     if judged.image is None:
         return judged
     whole = reference.airlight + reference.surface if study.study.wants_flip(chosen) else None
     return replace(judged, expected=reference.airlight, whole=whole)
 
 
-@kept("flip")
-def flip(reference: Array, test: Array, version: str) -> tuple[Flip, Layer | None]:
-    """Return HDR-FLIP by a version of its program, and its map."""
-    found, error_map = flip_hdr(reference, test)
-    return record_of(found, Flip), error_map
+def _flip(reference: Array, test: Array) -> tuple[Flip, Layer | None]:
+    """Return HDR-FLIP and its map."""
+    summary, error_map = flip_hdr(reference, test)
+    return record_of(summary, Flip), error_map
 
 
 def _with_flip(judged: Judged) -> Judged:
     """Return a row with its HDR-FLIP, whose map is a grey layer of the image, where it is asked for."""
     if judged.whole is None or judged.image is None:
         return judged
-    result = flip.result(judged.whole, judged.light, _flip_version())
-    found, error_map = result.value
+    whole, light = judged.whole, judged.light
+    inputs = FlipInputs(whole, light, _flip_version())
+    result = stored(inputs, lambda: _flip(whole, light), tuple[Flip, Layer | None])
+    summary, error_map = result.value
     image = judged.image
     if error_map is not None:
         image = replace(image, layers=dict(image.layers) | {"flip": np.repeat(error_map[:, :, None], 3, axis=2)})
-    return replace(judged, row=replace(judged.row, flip=found), image=image, results=(*judged.results, result))
+    return replace(judged, row=replace(judged.row, flip=summary), image=image, results=(*judged.results, result))
 
 
 def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     """Return the row of an image from elsewhere."""
     from validation.engine.images import image_times
 
-    digest = hashlib.sha256(shown.path.read_bytes()).hexdigest()
-    given = study.given_image(shown, digest, image_times(shown.path))
-    result = measured_image.result(*given, study=study, shown=shown)
+    times = image_times(shown.path)
+    inputs = ImageInputs(study.reference_inputs, study.identity, study.size, shown.label, shown.path, times)
+    result = stored(inputs, lambda: _measured_image(study, shown, times), Judged)
     whole = None if study.study.flip == "none" else result.value.whole
-    return replace(result.value, whole=whole, results=(result,))
+    return replace(result.value, row=replace(result.value.row, scene=study.path), whole=whole, results=(result,))
 
 
-@kept("scene-image")
-def measured_image(
-    scene: str,
-    reference_key: str | None,
-    size: tuple[int, int],
-    label: str,
-    file: str,
-    digest: str,
-    times: Any,
-    *,
-    study: SceneStudy,
-    shown: "EngineImage",
-) -> Judged:
-    """Return the row of an image with its layers, from the identity of its scene and the digest of its file."""
+def _measured_image(study: SceneStudy, shown: "EngineImage", times: tuple[Timing, str] | None) -> Judged:
+    """Return the row of an image with its layers."""
     from validation.engine.images import measure_image, notes_of
 
     judged, layers, surface = measure_image(
@@ -412,7 +468,7 @@ def measured_image(
     )
     row = replace(
         cell_row(study.cell(Configuration("image"))),
-        label=label,
+        label=shown.label,
         command=None,  # another program shows it
         note=notes_of(judged, times),
         kind="image",
@@ -427,7 +483,7 @@ def measured_image(
         whole = judged.reference
     elif "surface" in layers or not np.any(reference.surface > 0):
         whole = reference.airlight + reference.surface
-    image = Image(layers, attributes={"airlight:scene": study.name, "airlight:image": file})
+    image = Image(layers, attributes={"airlight:scene": study.name, "airlight:image": shown.path.name})
     return Judged(record_of(row, Row), image, judged.reference, whole)
 
 

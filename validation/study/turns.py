@@ -24,7 +24,7 @@ from realtime.errors import InputError
 from realtime.frame.renderer import FrameRenderer, parts, render_frame
 from realtime.methods.shader.source import is_shader
 from realtime.scene.read_scene import Scene, read_scene
-from reference.storage.kept import date
+from reference.storage.store import date
 from validation.clock import ROUNDS, Piece, in_turns, peak_memory, timed, timing_of
 from validation.study.configuration import prepared
 from validation.study.frame_times import (

@@ -30,6 +30,8 @@ def rgb(*values):
     return {"type": "rgb", "value": list(values)}
 
 
+SUN = {"type": "directional", "direction": [0, 0, -1], "irradiance": {"type": "rgb", "value": [1, 2, 3]}}
+
 CHANGES = {
     "extinction": lambda: changed("fog", sigma_t=0.3100001),
     "scale of the extinction": lambda: changed("fog", scale=1.1),
@@ -45,6 +47,25 @@ CHANGES = {
     "turned inside out": lambda: changed("ball", flip_normals=True),
     "without the sphere": lambda: load(ball=None),
     "field of view": lambda: changed("sensor", fov=49.5),
+    "near clip": lambda: changed("sensor", near_clip=1e-3),
+    "centre of the image": lambda: changed("sensor", principal_point_offset_x=0.1),
+    "extinction by channel": lambda: changed("fog", has_spectral_extinction=True),
+    "lights unsampled": lambda: changed("fog", sample_emitters=False),
+    "a table of the phase function": lambda: changed("fog", phase={"type": "tabphase", "values": "1,2,3"}),
+    "another table": lambda: changed("fog", phase={"type": "tabphase", "values": "1,2,4"}),
+    "light in the fog": lambda: changed("lamp", medium={"type": "ref", "id": "fog"}),
+    "sun": lambda: load(lamp=SUN),
+    "colour of the sun": lambda: load(lamp=SUN | {"irradiance": rgb(1, 2, 4)}),
+    "sky": lambda: load(lamp={"type": "constant", "radiance": rgb(1, 2, 3)}),
+    "colour of the sky": lambda: load(lamp={"type": "constant", "radiance": rgb(1, 2, 4)}),
+    "area light": lambda: changed("ball", emitter={"type": "area", "radiance": rgb(1, 2, 3)}),
+    "its colour": lambda: changed("ball", emitter={"type": "area", "radiance": rgb(1, 2, 4)}),
+    "disk": lambda: load(ball={"type": "disk"}),
+    "cube": lambda: load(ball={"type": "cube"}),
+    "cube inside out": lambda: load(ball={"type": "cube", "flip_normals": True}),
+    "metal": lambda: changed("ball", bsdf={"type": "conductor"}),
+    "another metal": lambda: changed("ball", bsdf={"type": "conductor", "material": "Au"}),
+    "another medium inside": lambda: changed("ball", interior={"type": "homogeneous"}),
     "size": lambda: changed("sensor", film=tiny_scene(size=(6, 4))["sensor"]["film"]),
     "nothing": load,
 }

@@ -18,7 +18,7 @@ from reference.quadrature.surface import surface_hits
 from reference.scene.read import read_reference
 from reference.storage.cache import cache_folder
 from reference.storage.exr import Image
-from reference.storage.kept import fresh_results
+from reference.storage.store import fresh_results
 from tests.helpers.scenes import tiny_scene
 from validation.estimates.agreement import MASK_PIXELS, pixel_angle
 from validation.estimates.images import (

@@ -85,7 +85,7 @@ def test_a_random_scene_is_its_seed_and_the_content_of_its_files(tmp_path):
 
 
 def test_a_users_code_is_in_the_key(tmp_path):
-    """The method's and the kernel's; `tests/reference/storage/test_kept.py` says which modules count with it."""
+    """The method's and the kernel's; `tests/reference/storage/test_code.py` says which modules count with it."""
     own = tmp_path / "fog_kernel.py"
     for chosen in (Configuration("shadow-planes", f"{own}:kernel"), Configuration(f"{own}:kernel", "exact")):
         keys = []
