@@ -83,6 +83,25 @@ def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["frame.exr", "frame.png"]
 
 
+@pytest.mark.claim("image-files")
+def test_the_picture_that_users_look_at_first_has_all_light_the_right_way_up(tmp_path):
+    """16 x 12 pixels against a picture by hand: Reinhard's curve on airlight and surface, encoded as sRGB."""
+    random = np.random.default_rng(7)
+    airlight, surface = (random.uniform(0.0, top, (12, 16, 3)).astype(np.float32) for top in (0.3, 1.0))
+    image = Image({"airlight": airlight, "surface": surface}, np.ones((12, 16), np.float32), {})
+    fields = {"kernel": None, "parameters": {}, "precision": "single", "plan": {}, "label": "m", "method": "m"}
+    frame = Rendering(scene="golden", image=sealed(image), **fields)
+    with Picture.open(frame.save(tmp_path / "frame.png")) as shown:
+        pixels = np.asarray(shown.convert("RGB")).astype(int)
+    total = airlight.astype(np.float64) + surface
+    exposure = 0.3 / total.mean()
+    white = max(1.0, exposure * np.percentile(total, 99.9))
+    x = exposure * total
+    linear = np.clip(x * (1 + x / white**2) / (1 + x), 0, 1)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    assert np.abs(pixels - 255 * encoded).max() <= 0.6  # half a step of 8 bits, and float32
+
+
 def test_rows_are_records_and_columns_by_their_paths():
     rows = [Row("fog", label, "m", None, "{}", 8, 6, "refused", reason="no <lights>") for label in "ab"]
     benched = MethodsStudy(name="methods", data={}, rows=tuple(rows))

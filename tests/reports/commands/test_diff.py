@@ -113,6 +113,16 @@ def test_twice_the_time_is_found_on_a_quiet_machine():
         assert {finding.what for finding in found(difference)} >= {"frame [ms]", "airlight [ms]"}
 
 
+@pytest.mark.claim("diff")
+def test_a_quarter_of_a_time_is_the_tolerance_that_nobody_set(files, capsys):
+    """Without an option: 20 % slower in all stages is noise of a quiet machine, 40 % is not."""
+    for factor, status in ((1.2, 0), (1.4, 1)):
+        new = report()
+        slow_down(method(new), factor)
+        assert run(["diff", *files(report(), new)]) == status, factor
+    assert "shadow-planes (exact)" in capsys.readouterr().out
+
+
 def test_another_machine_is_compared_beside_the_median_of_all():
     new = report(machine=2.0)
     (finding,) = found(compare_reports(report(), new))  # the same machine: everything is slower, which is one finding

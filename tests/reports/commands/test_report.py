@@ -148,6 +148,19 @@ def test_from_python_a_function_runs_in_this_process(variant, tmp_path, handed_o
     assert not handed_on["apart"]
 
 
+@pytest.mark.claim("exit-status")
+@pytest.mark.parametrize(("equivalent", "status"), [(True, 0), (None, 1), (False, 1)])
+def test_a_report_ends_with_one_where_its_reference_is_not_confirmed(variant, monkeypatch, capsys, equivalent, status):
+    """Confirmed, not decided, contradicted; no method is at fault in any of them."""
+    from tests.helpers.reports import agreement, entry, scene
+
+    studied = scene("fog", [entry("unshadowed (exact)")], agreement={"volpath airlight": agreement(equivalent)})
+    made = checked(report_of([studied]))
+    monkeypatch.setattr("reports.report.measure.write_report", lambda folder, study, **options: made)
+    assert run(["report", "open-fog", "--method", "unshadowed"]) == status
+    assert "error:" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("progress", [None, True])
 def test_how_to_reproduce_a_report_is_what_made_it(variant, tmp_path, handed_on, progress):
     """Typed, called from Python by names, and with a function; never the arguments of the process that called."""

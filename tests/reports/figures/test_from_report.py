@@ -14,6 +14,7 @@ from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from reports.data.records import load_report
 from reports.figures import report as figures
+from reports.plotting.pictures import error_map, exposure, tone_mapped
 from tests.helpers.reports import (
     RUN,
     checked,
@@ -99,3 +100,28 @@ def test_the_strip_shows_where_methods_are_wrong(report):
         figures._strip(data, place, "a_scen", None)
     with pytest.raises(InputError, match="got 'nothing'"):
         figures._strip(data, place, None, ["nothing"])
+
+
+def test_the_panels_of_the_strip_are_the_images_under_their_names(report):
+    """Every picture and every error map against the data, in the order of the titles."""
+    data, place = load_report(report)
+    scene, methods, images = figures._strip(data, place, None, None)
+    figure = figures.draw_strip(scene, methods, images, "double")
+    titled = [axes for axes in figure.axes if axes.get_title() and axes.images]
+    assert [axes.get_title().split("\n")[0] for axes in titled] == [
+        "reference",
+        *(m.label.split(" (")[0] for m in methods),
+    ]
+    factor = exposure(images[0])
+    large = [
+        axes.images[0].get_array()
+        for axes in figure.axes
+        if axes.images and axes.images[0].get_array().shape[:2] == _SIZE
+    ]
+    # The reference has a scale in place of an error map.
+    pictures, errors = [large[0], *large[1::2]], large[2::2]
+    for shown, image in zip(pictures, images, strict=True):
+        np.testing.assert_array_equal(shown, tone_mapped(image, factor))
+    for shown, image in zip(errors, images[1:], strict=True):
+        np.testing.assert_array_equal(shown, error_map(images[0], image))
+    assert not np.array_equal(errors[0], errors[1])

@@ -3,6 +3,7 @@
 
 import json
 import math
+import re
 import runpy
 from pathlib import Path
 
@@ -225,3 +226,35 @@ def test_describe_writes_it(variant, tmp_path):
     assert mi.VolumeGrid(str(tmp_path / "smoke.vol")).max() == pytest.approx(4.7)
     with pytest.raises(airlight.InputError, match="the medium is no height fog and no grid"):
         airlight.describe("open-fog", output=tmp_path / "open.vol")
+
+
+#: Units of the numbers that an engine programmer types, by their names: those of the notation of DESIGN.
+UNITS = {
+    **dict.fromkeys(("position", "mean_free_path", "scale_height", "radius"), "m"),
+    **dict.fromkeys(("sigma_t", "sigma_s", "sigma_a"), "1/m"),
+    **dict.fromkeys(("cutoff_angle", "beam_angle"), "degrees from the axis"),
+    **dict.fromkeys(("fov_horizontal", "fov_vertical"), "degrees"),
+    **dict.fromkeys(("power", "power_all_round"), "W"),
+    **{"intensity": "W/sr", "size": "pixels", "albedo": "", "axis": "", "forward": "", "right": "", "up": ""},
+}
+
+
+def test_the_printed_description_has_the_numbers_of_the_json_with_their_units(variant, capsys):
+    """Each number of camera, medium and light, once, to seven digits, with the unit that its name has."""
+    assert run(["describe", "sphere-spot", "--size", "16x12"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert run(["describe", "sphere-spot", "--size", "16x12", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    parts = {"camera": data["camera"], "medium": data["medium"], "light": data["lights"][0]}
+    begins = {part: next(n for n, line in enumerate(lines) if re.match(rf"{part}\s", line)) for part in parts}
+    checked = set()
+    for part, values in parts.items():
+        for name, value in values.items():
+            if isinstance(value, str | dict):
+                continue
+            written = ", ".join(f"{each:.7g}" for each in value) if isinstance(value, list) else f"{value:.7g}"
+            wanted = f"({written}) {UNITS[name]}" if isinstance(value, list) else f"{written} {UNITS[name]}"
+            shown = next(line for line in lines[begins[part] :] if re.search(rf"(^|\s){name}\s", line))
+            assert shown.rpartition(f"{name} ")[2].strip() == wanted.strip()
+            checked.add(name)
+    assert checked == set(UNITS) - {"scale_height", "radius"}

@@ -52,6 +52,8 @@ def test_claims_on_a_reference_that_is_confirmed():
     kinds = [("reference", True), ("left-out", None), ("times", None)]
     assert [(claim.kind, claim.good) for claim in claims(scenes())] == kinds
     assert "confirmed by Mitsuba's volpath in 3 of 3 comparisons" in texts(scenes())[0]
+    # 0.123 of the airlight, which is the headline; 0.21 of everything, which is not.
+    assert "The fraction of the airlight that this leaves out: fog 12 %; hall 12 %." in texts(scenes())[1]
     assert claims([]) == []
     data = scenes()
     data[1]["agreement"]["airlight"] = agreed(True, 0.0042, margin=0.0125)
