@@ -176,7 +176,7 @@ def _converted(what: str, value: Any, default: Any) -> int | float | str:
         try:
             return float(value)
         except (TypeError, ValueError):
-            raise InputError(f"{what} got {value!r}, expected a number") from None
+            raise InputError(f"{what} got {value!r}, expected a number, such as 0.5") from None
     if isinstance(default, int):
         try:
             # int() would cut off what stands behind the point, and take True for 1.

@@ -246,7 +246,7 @@ def run(arguments: Sequence[str]) -> int:
     except OSError:  # Dr.Jit ends the process over it
         return _fail("the current folder was deleted: change into another folder, then run this again", WRONG_INPUT)
     try:
-        words = list(arguments)
+        words = [_at_home(word) for word in arguments]
         if words[:1] == ["test"] and "--" not in words:  # pytest has its own options
             ours = [word for word in words[1:] if word in ("--all", "--help", "-h")]
             words = ["test", *ours, "--", *(word for word in words[1:] if word not in ours)]
@@ -270,13 +270,23 @@ def run(arguments: Sequence[str]) -> int:
             raise
         return _fail(f"system libraries are missing. To install them: {install_line(packages)}", MISSING)
     except cyclopts.CycloptsError as error:
-        path = " ".join(["airlight", *(error.command_chain or ())])
-        return _fail(f"{str(error).rstrip('.')} (see `{path} --help`)", WRONG_INPUT)
+        path, said = " ".join(["airlight", *(error.command_chain or ())]), str(error).rstrip(".")
+        comma = re.search(r'unable to convert "(-?\d+),(\d+)"', said)
+        hint = f"; write {comma[1]}.{comma[2]}" if comma else ""
+        return _fail(f"{said}{hint} (see `{path} --help`)", WRONG_INPUT)
     except _input_errors() as error:
         return _fail(str(error), WRONG_INPUT)
     if not arguments:
         return WRONG_INPUT
     return status if isinstance(status, int) else DONE
+
+
+def _at_home(word: str) -> str:
+    """Return a word with the home folder for a ~ at its beginning, also behind --option=, where shells leave it."""
+    option, equals, value = word.partition("=")
+    if word.startswith("~"):
+        return os.path.expanduser(word)
+    return f"{option}={os.path.expanduser(value)}" if option.startswith("-") and equals else word
 
 
 def _input_errors() -> tuple[type[Exception], ...]:

@@ -145,7 +145,10 @@ def _checked(name: str, values: Sequence[float], known: Mapping[str, Changeable]
     item = known[name]
     if len(values) not in item.sizes:
         sizes = " or ".join(str(size) for size in item.sizes)
-        raise InputError(f"{name}: got {len(values)} numbers, expected {sizes}, with commas between them")
+        raise InputError(
+            f"{name}: got {len(values)} numbers, expected {sizes}, with commas between them and a point "
+            "in each, such as 0.5"
+        )
     numbers = np.array(values, dtype=np.float64)
     if not np.all((numbers >= item.least) & (numbers <= item.most)):
         given = ",".join(f"{value:g}" for value in values)

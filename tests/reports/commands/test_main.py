@@ -80,6 +80,31 @@ def test_every_argument_and_option_has_help(words):
     assert arguments or words == ("doctor",)
 
 
+def test_a_path_may_begin_at_home(tmp_path, monkeypatch, capfd):
+    """A ~ that the shell has not expanded: in quotes, or behind an option's equals sign."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    for words in (["-o", "~/one.glsl"], ["--output=~/two.glsl"]):
+        assert cli.run(["export", *words]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.glsl", "two.glsl"]
+    assert cli.run(["diff", "~/old", "~/new"]) == 2
+    assert f"{tmp_path}/old" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["compare", "open-fog", "a.exr", "--margin", "0,5"], "write 0.5"),
+        (["render", "open-fog", "--change", "medium.sigma_t=0,5"], "such as 0.5"),
+        (["render", "open-fog", "--method", "ray-march", "--set", "tolerance=0,5"], "such as 0.5"),
+    ],
+)
+def test_decimal_commas_are_refused_with_how_to_write_the_number(variant, words, hint, capfd):
+    assert cli.run(words) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert hint in line
+
+
 @pytest.mark.claim("no-color")
 def test_no_color_leaves_letters_alone_on_a_terminal(capsys, monkeypatch):
     monkeypatch.setattr(cli, "terminal_width", lambda: 80)
