@@ -218,13 +218,16 @@ class Reference(LayeredImage):
     """The reference of a scene, with its error."""
 
     estimator: str  #: 'quadrature', 'single-scatter', 'volpath' or 'cloud-paths'
-    relative_error: float  #: the mean bound of the airlight over its mean, or the relative standard error of the image
+    relative_error: float  #: the mean error of the airlight over its mean, or the relative standard error of the image
     #: Shadow rays that checked the quadrature, or batches of an estimator that samples; None of merged files.
     how: QuadratureReference | MonteCarloReference | None = None
 
     @property
     def bound(self) -> Array | None:
-        """The bound of the airlight's error [W/(m^2 sr)], (height, width, 3); None for an estimator that samples."""
+        """The error of the airlight, of the kind that `how` says [W/(m^2 sr)], (height, width, 3).
+
+        Without that of samples of lights; None for an estimator that samples.
+        """
         return self.image.layers.get("airlight_bound")
 
     @property
@@ -256,9 +259,12 @@ class Reference(LayeredImage):
         for name, mean in made["means"].items():
             unit = "" if name == "opacity" else " W/(m^2 sr)"
             lines.append(f"  {name}: mean {', '.join(f'{value:.6g}' for value in mean)}{unit}")
+        how = self.how
+        if isinstance(how, QuadratureReference) and how.relative_bound is not None:
+            lines.append(f"  airlight known to {how.relative_bound:.2g} of its mean ({how.kind})")
         if "batches" not in made:
             return lines
-        batches, how = int(made["batches"]), self.how
+        batches = int(made["batches"])
         # A quadrature traces nothing: it has batches only where there are area lights, and they have no seeds.
         if "spp" in made:
             kind = "batches"

@@ -16,7 +16,7 @@ Errors of V and b^2 come from leaving out one run at a time. N runs averaged hav
 a part of their random numbers, or of their history, have noise that is correlated: of N independent ones the noise n_i
 has the correlation -1/(N - 1) between two runs, as the mean over runs is taken away. A pair that exceeds it by more
 than a tenth, and that by four errors from blocks of pixels, is no pair of independent runs: no bias and no average is
-reported then. What all runs share alike is no noise, but bias.
+reported then. Noise that all runs share alike is bias.
 
 **Whether the interval holds.** With noise of a heavy tail the brightest values come so rarely that a few runs may have
 none: their mean is then too dark and their spread too small. For a sum of independent deviations x with skewness g =
@@ -146,7 +146,7 @@ def measure_noise(reference: Array, runs: Sequence[Array], seconds: float | None
     """Return the noise of renders of a frame; all of the error of a single one is bias.
 
     `reference`: (height, width, channels), finite; `runs`: independent renders of that shape, finite; one of a renderer
-    without random numbers; `seconds`: what one takes. Of runs that are the same the first counts. Raises InputError for
+    without random numbers; `seconds`: what one takes. Several runs that are the same count once. Raises InputError for
     a dark reference, and where all runs are the same.
     """
     given, runs = runs, [runs[number] for number in sorted(set(first_equal(runs)))]

@@ -228,6 +228,7 @@ def test_the_mean_of_runs_is_unknown_where_one_of_them_is():
     assert (found.lag.lag.value, found.lag.delay, found.nonfinite) == (None, None, 3)
     assert motion_verdict(found).kind == "cannot be told"
     assert found.relative_rmse.value == pytest.approx(0.1, rel=0.01)
+    assert mean_measures([runs[0], runs[0]]) == runs[0]  # one seed twice: no spread, which is no error of 0
 
 
 @pytest.mark.slow
