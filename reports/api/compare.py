@@ -128,6 +128,11 @@ def compare(
     if fit is not None:
         exclude("fit", "asks for the fog of one image", {"frames": frames, **about})
     if frames is not None or (scene is not None and _are_several(test)):
+        if diagnose or fit is not None:
+            option = "diagnose" if diagnose else "fit"
+            raise InputError(
+                f"{option}: got {test}, which stands for several files; expected one image: name one of the files"
+            )
         exclude("compare", "several files are judged together", about | {"mask": mask, "margin": None})
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}
         return _several(str(scene), test, frames, progress=progress, **how)

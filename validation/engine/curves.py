@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Encodings and tone curves that engines apply before they write values. Values below 0 stay, or become 0."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -24,6 +24,12 @@ def from_srgb(encoded: Array) -> Array:
 def srgb_in_8_bits(radiance: Array) -> Array:
     """Return values after 8-bit encoding by that curve, as numbers from 0 to 1."""
     return np.round(255 * np.clip(to_srgb(radiance), 0.0, 1.0)) / 255
+
+
+def to_pq(radiance: Array, white: float) -> Array:
+    """Return values encoded by the curve of SMPTE ST 2084, 1 being a luminance [cd/m^2]."""
+    power = np.clip(radiance * white / 10_000, 0.0, 1.0) ** (2610 / 16384)
+    return np.asarray(((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** (2523 / 32))
 
 
 def gamma(radiance: Array, exponent: float) -> Array:
@@ -78,6 +84,29 @@ def agx(radiance: Array) -> Array:
     linear = from_srgb(encoded)
     return np.clip(to_srgb(linear @ _AGX_AFTER.T), 0.0, 1.0)
 
+
+# Chromaticities of red, green, blue and white: IEC 61966-2-1, SMPTE EG 432-1, ITU-R BT.2020, S-2014-004, ST 2065-1.
+_SRGB = (0.64, 0.33), (0.3, 0.6), (0.15, 0.06), (0.3127, 0.329)
+_SPACES = {
+    "Display P3": ((0.68, 0.32), (0.265, 0.69), (0.15, 0.06), (0.3127, 0.329)),
+    "Rec. 2020": ((0.708, 0.292), (0.17, 0.797), (0.131, 0.046), (0.3127, 0.329)),
+    "ACEScg (AP1)": ((0.713, 0.293), (0.165, 0.83), (0.128, 0.044), (0.32168, 0.33767)),
+    "ACES 2065-1 (AP0)": ((0.7347, 0.2653), (0.0, 1.0), (0.0001, -0.077), (0.32168, 0.33767)),
+}
+_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+
+
+def _to_cones(space: Sequence[tuple[float, float]]) -> Array:
+    """Return the matrix from colours to Bradford's cone responses over those of white."""
+    xyz = np.array([(x / y, 1.0, (1 - x - y) / y) for x, y in space]).T
+    cones = _BRADFORD @ xyz
+    return (cones[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])) / cones[:, 3:]
+
+
+#: Matrices from colours with the primaries of sRGB to others, white to white, by the name of the others.
+PRIMARIES: Mapping[str, Array] = {
+    name: np.linalg.solve(_to_cones(space), _to_cones(_SRGB)) for name, space in _SPACES.items()
+}
 
 #: By what is said of an image.
 TONE_CURVES: Mapping[str, Callable[[Array], Array]] = {

@@ -28,6 +28,7 @@ _NAMED = {
     "pi^2": math.pi**2,
     "4 pi^2": 4 * math.pi**2,
     "683, lumens a watt": 683.0,
+    "12.92, the slope of the sRGB curve at black": 12.92,
 }
 
 
@@ -170,6 +171,8 @@ def traits(predictor: Predictor) -> dict[str, bool]:
         "no bounds": not reference.media,
         "height fog": fog.height is not None,
         "even fog": fog.height is None,
+        "clamped layers": fog.height is not None and fog.height.clamped,
+        "rising layers": fog.height is not None and not fog.height.clamped,
         "fog": holds != "surface",  # in the image
         "all light": holds == "total",
         "both": holds == "total" and shapes,  # fog and surfaces in one layer

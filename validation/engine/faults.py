@@ -7,7 +7,7 @@ fault back from a whole image, without any path of light.
 
 from dataclasses import replace
 
-from validation.engine.fault import Fault, traits
+from validation.engine.fault import Fault, of_fog_alone, traits, with_scenery
 from validation.engine.image_faults import BRIGHTNESS, CAMERA, VALUES
 from validation.engine.layer_faults import FOG_AND_SURFACES, factor_fault, scaled
 from validation.engine.light_faults import LIGHTS
@@ -43,9 +43,17 @@ def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
         groups |= {f"the light '{source.name}'": (number,) for number, source in enumerate(sources)}
     own = []
     for which, numbers in groups.items():
-        words = f"{which} {'is' if which.startswith('the') else 'are'} {{0:.4g}} times as bright as they should be"
+        are, they = ("is", "it") if len(numbers) == 1 else ("are", "they")
+        words = f"{which} {are} {{0:.4g}} times as bright as {they} should be"
         own.append(factor_fault("light-factor", words, scaled("intensity", numbers)))
         words = f"the fog of {which} is {{0:.4g}} times as bright as it should be"
         own.append(factor_fault("fog-factor", words, scaled("airlight", numbers), ("both",)))
+        unshadowed = with_scenery(unshadowed=numbers)
+        for change, where, needs in (
+            (unshadowed, "", ("shapes",)),
+            (of_fog_alone(unshadowed), " in the fog, on surfaces it does", ("both",)),
+        ):
+            words = f"nothing casts a shadow in the light of {which}{where}"
+            own.append(Fault("no-shadow", words, change, needs=needs, kind="light"))
     there = traits(predictor)
     return tuple(fault for fault in (*FAULTS, *own) if all(there[need] for need in fault.needs))

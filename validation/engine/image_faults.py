@@ -8,7 +8,7 @@ from itertools import permutations, product
 import numpy as np
 
 from validation.arrays import Array
-from validation.engine.curves import TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_srgb
+from validation.engine.curves import PRIMARIES, TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_pq, to_srgb
 from validation.engine.fault import Change, Fault, Number, Values, changed_values, scenery_number, top, undone
 from validation.engine.prediction import Guess, Predictor
 
@@ -98,11 +98,15 @@ def _exposed(predictor: Predictor, guess: Guess, p: Values) -> Guess:
     return replace(guess, fog=replace(guess.fog, exposure=(red, green, blue)))
 
 
+_EXPOSURES = tuple(2.0**stops for stops in (0, 1, -1, 2, -2, 3, -3, 4, -4))  # that a curve after it may hide
+
+
 def _ratio(predictor: Predictor, guess: Guess) -> Sequence[Values]:
-    """Return the usual ratio of image and guess."""
+    """Return the usual ratio of image and guess, and some times it: a curve may come after."""
     predicted, shown = predictor.predicted(guess), predictor.shown(guess)
     lit = (predicted > 0.01 * predicted.mean()) & (shown > 0)
-    return [(float(np.median(shown[lit] / predicted[lit])) if lit.any() else 1.0,)]
+    usual = float(np.median(shown[lit] / predicted[lit])) if lit.any() else 1.0
+    return [(usual * exposure,) for exposure in _EXPOSURES]
 
 
 def _clamp(predictor: Predictor, guess: Guess, p: Values) -> Guess:
@@ -141,12 +145,24 @@ VALUES = (
         changed_values(to_srgb),
         undo=from_srgb,
     ),
+    Fault(
+        "transfer",
+        "the values are decoded from sRGB, though they are linear: leave them as they are",
+        changed_values(from_srgb),
+        undo=to_srgb,
+    ),
     Fault("transfer", "the values were written in 8 bits by the sRGB curve", changed_values(srgb_in_8_bits)),
     Fault(
         "transfer",
         "the values are encoded by a gamma of {0:.3g}: write linear ones",
         changed_values(gamma),
         (Number(0.2, 5.0, (0.4545, 1.8, 2.2, 2.4), scale="log"),),
+    ),
+    Fault(
+        "transfer",
+        "the values are encoded by the PQ curve of SMPTE ST 2084, 1 as {0:.4g} cd/m^2: write linear ones",
+        changed_values(to_pq),
+        (Number(1e-3, 1e6, (100.0, 10_000.0), scale="log"),),
     ),
     Fault("clamp", "the values are cut off at the largest one: write floats", _clamp, needs=("stop",)),
     *(
@@ -159,6 +175,15 @@ VALUES = (
         changed_values(lambda radiance, level: radiance + level),
         (Number(1e-30, 1e30, scale="log"),),
         begin=_darkest,
+    ),
+    *(
+        Fault(
+            "primaries",
+            f"the colours have the primaries of {name}: convert them to those of sRGB",
+            changed_values(lambda radiance, matrix=matrix: radiance @ matrix.T),
+            needs=("colours",),
+        )
+        for name, matrix in PRIMARIES.items()
     ),
     *(_swapped(order) for order in permutations(range(3)) if order != (0, 1, 2)),
 )

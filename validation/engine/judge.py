@@ -71,6 +71,8 @@ BLOCK = 8  #: side of a block [pixels], less in images of less than ten blocks
 RIGHT = 0.01  #: largest relative error of an image that is called right
 _DIM = 0.05  # of the mean: a block that is dimmer in both images says nothing
 _APART = 0.01  # by how much the two references must differ, relative to the larger, for a value to say which fits
+_FEW_WRONG = 0.1  # of the pixels: what stands on an image, or is missing in it; more are another image
+_APART_FROM_NOISE = 6.0  # median errors: noise of a normal distribution is beyond in 5 pixels of 100 000
 _EXACT = 1e-3  # relative error of an image that fits the centres so well that nothing can fit better
 
 
@@ -83,6 +85,11 @@ class Verdict:
     block: int  #: side of a block [pixels]
     block_error: float  #: relative error of block means; NaN where no block is lit
     block_noise: float  #: what the scatter of the pixels within them explains of it
+
+    @property
+    def noise_alone(self) -> bool:
+        """Whether the scatter within blocks explains the error of their means, and nothing else is in the way."""
+        return len(self.reasons) <= 1 and self.block_noise > self.block_error / math.sqrt(2)
 
     @property
     def words(self) -> str:
@@ -337,6 +344,25 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
         most = ", most of it noise: render more samples" if noise > error / math.sqrt(2) else ""
         reasons.append(f"{size} are {100 * error:.3g} % off{most}")
     return Verdict(not reasons, tuple(reasons), side, error, noise)
+
+
+def all_but_few(compared: EngineComparison) -> str:
+    """Say which pixels are wrong where these are few and all others are right; nothing where that is not so."""
+    reference, image = (np.asarray(values, dtype=np.float64) for values in (compared.reference, compared.image))
+    finite = np.isfinite(reference)
+    floor = FLOOR * float(reference[finite].mean()) if finite.any() else 0.0
+    errors = np.abs(relative_errors(reference, image, floor)).max(axis=2)
+    wrong = errors > max(RIGHT, _APART_FROM_NOISE * float(np.median(errors)))
+    if not 0 < np.count_nonzero(wrong) <= _FEW_WRONG * wrong.size:
+        return ""
+    others = np.where(wrong[..., None], np.nan, image)
+    if not judge(reference, others, find_hints(reference, others), ()).right:
+        return ""
+    row, column = np.nonzero(wrong)
+    return (
+        f"all is right but {len(row)} of {wrong.size} pixels, in columns {column.min()} to {column.max()} and rows "
+        f"{row.min()} to {row.max()} from the upper left"
+    )
 
 
 def _block_errors(reference: Array, image: Array, side: int) -> tuple[float, float]:

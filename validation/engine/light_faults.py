@@ -23,10 +23,23 @@ from validation.engine.prediction import Guess, Predictor
 from validation.fog_model.view import Scenery
 
 
-def _window(change: Callable[[Array], Array]) -> Change:
-    return lambda predictor, guess, p: replace(
-        guess, fog=replace(guess.fog, window=lambda r: change(np.minimum(r / p[0], 1.0)))
-    )
+def _window(factor: Callable[..., Array]) -> Change:
+    """Return a function that gives the light a factor, by the distance from it and the numbers of a fault."""
+    return lambda predictor, guess, p: replace(guess, fog=replace(guess.fog, window=lambda r: factor(r, *p)))
+
+
+def _within(change: Callable[[Array], Array]) -> Callable[[Array, float], Array]:
+    """Return a factor by the distance, of a function of the distance over a range."""
+    return lambda r, end: change(np.minimum(r / end, 1.0))
+
+
+def _softened(r: Array, size: float) -> Array:
+    return r**2 / (r**2 + size)
+
+
+def _of_a_disk(r: Array, radius: float) -> Array:
+    """Return the light of a disk that faces a point over that of a point light: its cosine is that of a place."""
+    return 2 * r**2 / (r**2 + radius**2 + r * np.sqrt(r**2 + radius**2))
 
 
 def _ranges(predictor: Predictor, guess: Guess) -> Sequence[Values]:
@@ -80,9 +93,34 @@ LIGHTS = (
     ),
     *(
         Fault(
+            "distance-law",
+            words,
+            _window(law),
+            (Number(1e-6, 1e3, (0.01, 0.1, 1.0), scale="log"),),
+            needs=("lamps",),
+        )
+        for words, law in (
+            ("the light falls as 1/(r^2 + e) with e = {0:.3g} m^2: it is softened near its source", _softened),
+            (
+                "the light falls as 2/(r^2 + R^2 + r sqrt(r^2 + R^2)), that of a disk of the radius R = {0:.3g} m that "
+                "faces every point: a soft falloff",
+                _of_a_disk,
+            ),
+        )
+    ),
+    Fault(
+        "distance-law",
+        "the light falls as 1/(r^2 + e) with e = {0:.3g} m^2, and ends by (1 - (r/R)^4)^2 with R = {1:.4g} m",
+        _window(lambda r, size, end: _softened(r, size) * (1 - np.minimum(r / end, 1.0) ** 4) ** 2),
+        (Number(1e-6, 1e3, scale="log"), Number(1e-3, 1e6, scale="log")),
+        begin=lambda predictor, guess: [(size, *end) for size in (0.1, 1.0) for end in _ranges(predictor, guess)],
+        needs=("lamps",),
+    ),
+    *(
+        Fault(
             "light-range",
             f"lights have a range: {words} {{0:.4g}} m",
-            _window(change),
+            _window(_within(change)),
             (Number(1e-3, 1e6, scale="log"),),
             begin=_ranges,
             needs=("lamps",),
@@ -116,6 +154,14 @@ LIGHTS = (
         "spots fall off from their axis on, not from the beam's edge",
         with_scenery(edge="smooth"),
         needs=("spots",),
+    ),
+    *(
+        Fault("spot-falloff", f"spots fall off {words}", with_scenery(edge=edge), needs=("soft spots",))
+        for words, edge in (
+            ("as a line in the cosine, not in the angle", "linear"),
+            ("squared in the cosine, as glTF has it, not as a line in the angle", "square"),
+            ("smoothly in the cosine, by 3 x^2 - 2 x^3, not as a line in the angle", "smoothstep"),
+        )
     ),
     Fault(
         "spot-falloff",

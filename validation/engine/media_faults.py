@@ -254,6 +254,12 @@ MEDIUM = (
         )
         for name, words in (("light-path", "from the light"), ("camera-path", "to the camera"))
     ),
+    Fault(
+        "no-extinction",
+        "nothing is attenuated, neither on the way from the light nor on the way to the camera: the extinction is "
+        "missing, what is scattered is right",
+        with_law(light_segment=(0.0, 0.0), camera_segment=(0.0, 0.0)),
+    ),
     *(
         Fault(
             f"{of}-path",
@@ -356,6 +362,18 @@ MEDIUM = (
         _stretched(lambda h, factor: h * factor),
         (Number(1e-3, 1e3, _FACTOR, scale="log"),),
         needs=("height fog",),
+    ),
+    *(
+        Fault(
+            "base-height",
+            f"layers {words}",
+            changed_fog(lambda fog, clamped=clamped: replace(fog, height=replace(fog.height, clamped=clamped))),
+            needs=("height fog", need),
+        )
+        for words, clamped, need in (
+            ("are clamped: their density is constant below their base", True, "rising layers"),
+            ("are not clamped: their density goes on rising below their base", False, "clamped layers"),
+        )
     ),
     Fault(
         "base-height",

@@ -109,8 +109,10 @@ def begin(predictor: Predictor, faults: Sequence[Fault]) -> tuple[float, tuple[V
 
 
 def _coarse(predictor: Predictor, faults: Sequence[Fault]) -> Predictor:
+    if any(fault.costly > 1 for fault in faults) and not predictor.many:
+        return predictor.fewest
     moves = any(parameter.step for fault in faults for parameter in fault.parameters)
-    return predictor.coarse if moves else predictor
+    return predictor.coarse if moves else predictor.quick
 
 
 def guess_of(

@@ -11,7 +11,7 @@ import numpy as np
 from analytic.clock import stopwatch
 from analytic.errors import InputError
 from reference.scene.read import ReferenceScene
-from reference.storage.exr import Image
+from reference.storage.exr import NOTE, Image
 from validation.arrays import Array, Bools, Progress
 from validation.engine.prediction import Predictor, SceneLight
 from validation.engine.seen import (
@@ -81,6 +81,7 @@ class Fit:
     confounded: tuple[Confounded, ...]
     seconds: float  #: that the fit took, with the paths of light
     failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
+    note: str = ""  #: what the reader of the file changed or left out, such as other primaries
 
     @property
     def lines(self) -> list[str]:
@@ -102,6 +103,7 @@ class Fit:
             if each.high is None and each.low is not None and each.name not in held
         ]
         lines += [f"Failed: {reason}." for reason in self.failures]
+        lines += [f"The file: {self.note}."] if self.note else []
         lines.append(f"The fit took {self.seconds:.2g} s.")
         return lines + [line for group in self.confounded for line in group.lines]
 
@@ -156,7 +158,7 @@ def fit_image(
         lambda each: _wrong(each.solution) < _EXACT,
     )
     fit = _fit((loaded.name, path, judged.holds, kind.pixel), unknowns, found)
-    return replace(fit, seconds=took().seconds, failures=wrong)
+    return replace(fit, seconds=took().seconds, failures=wrong, note=str(image.attributes.get(NOTE, "")))
 
 
 def _predictor(seen: Seen) -> Predictor:

@@ -188,6 +188,9 @@ def _chosen(name: str, place: str, kind: str, reference: ReferenceScene, fog: Fo
     """Return the numbers of media or lights, and the endings that names have for them where there are several."""
     if kind in _OF_MEDIA:
         what, names = "medium", ["medium", *(medium.name for medium in reference.media)]
+        # The medium without bounds is the camera's: its id in the file is another name of it.
+        around = reference.scene.sensors()[0].get_medium()
+        place = "medium" if around is not None and place and place == around.id() else place
         numbers = [number for number, sigma_t in enumerate(fog.sigma_t) if max(sigma_t) > 0]
         several = len(numbers) > 1
     else:

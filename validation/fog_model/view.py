@@ -5,7 +5,7 @@ The lit intervals depend on the place of a light and the width of its cone, not 
 a view finds them once.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -45,11 +45,12 @@ class Scenery:
     """The properties of a scene that decide the paths of light, besides its own; each combination has its own paths."""
 
     shadows: bool = True
+    unshadowed: tuple[int, ...] = ()  #: numbers of lights of which nothing casts a shadow
     offset: tuple[float, float] = (0.0, 0.0)  #: of all rays, to the right and down [pixels]
     zoom: float = 1.0  #: factor on the distance of pixels from the middle of the image
     moved: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)  #: of the first point and spot lights [m]
     cone: float = 1.0  #: factor on the angles of spots
-    edge: str = ""  #: of spots: 'hard', or 'smooth' from the axis on; the scene's own
+    edge: str = ""  #: of spots: 'hard', 'smooth' from the axis on, or one of `EDGES`; the scene's own
     radius: float = 0.0  #: of spheres in the place of point lights [m]
     blend: float = 0.0  #: fraction of 1 - cos(cut-off) in which spots fall off smoothly, as Blender's do
 
@@ -62,13 +63,20 @@ class Scenery:
             if light.axis is not None and self.cone != 1:
                 cutoff, beam = (min(angle * self.cone, 0.499 * np.pi) for angle in (light.cutoff, light.beam))
                 light = replace(light, cutoff=cutoff, beam=beam)
-            if light.axis is not None and self.edge:
+            if light.axis is not None and self.edge in ("hard", "smooth"):
                 light = replace(light, beam=light.cutoff if self.edge == "hard" else 0.0)
             lights.append(light)
         return tuple(lights)
 
 
 SCENERY = Scenery()  #: as the scene has it
+
+#: How spots fall off, by the fraction of the way from the cosine of the cut-off to that of the beam's edge.
+EDGES: Mapping[str, Callable[[Array], Array]] = {
+    "linear": lambda part: part,
+    "square": lambda part: part**2,
+    "smoothstep": lambda part: part * part * (3 - 2 * part),
+}
 
 
 @dataclass(frozen=True)
@@ -241,11 +249,13 @@ def scattering_paths(
     an area light.
     """
     reference = replace(view.reference, lights=scenery.lights(view.reference))
-    between, shadows = None if ends is None else view.ends(ends), scenery.shadows
+    between = None if ends is None else view.ends(ends)
     # A directional light comes through a medium without bounds only where its density falls with height.
     far = bool(reference.media) or isinstance(reference.medium, HeightMedium)
+    edge = EDGES.get("smoothstep" if scenery.blend else scenery.edge)
     paths = []
-    for source in light_sources(reference, samples, scenery.radius):
+    for number, source in enumerate(light_sources(reference, samples, scenery.radius)):
+        shadows = scenery.shadows and number not in scenery.unshadowed
         nodes, points = ([no_places(len(reference.media) + 1, surface=surface)] for surface in (False, True))
         for given in source.lights:
             light = _whole_within(given, scenery.blend) if scenery.blend else given
@@ -253,10 +263,10 @@ def scattering_paths(
             if 0 in layers and (far or not is_far):
                 reach = view.reach(light, shadows=shadows, area=source.area)
                 make: Any = parallel_nodes if is_far else point_nodes
-                nodes.append(_edged(make(reference, light, reach, between), light, source, scenery.blend))
+                nodes.append(_edged(make(reference, light, reach, between), light, source, edge))
             if 1 in layers and reference.occluders.shapes():
                 lit = surface_points(reference, light, view.distance, *view.reflected(light, shadows=shadows))
-                points.append(_edged(lit, light, source, scenery.blend))
+                points.append(_edged(lit, light, source, edge))
         paths.append(LightPaths(np.asarray(source.intensity), Places.joined(nodes), Places.joined(points)))
     return tuple(paths)
 
@@ -314,9 +324,9 @@ def _as_sphere(name: str, light: ReferenceLight, plan: PointPlan, radius: float)
     return Source(name, 4 * light.intensity / plan.most, samples, light.position)
 
 
-def _edged(places: Places, light: Light, source: Source, blend: float) -> Places:
-    """Return places with the edge of a spot as Blender has it, and as a sphere lights them that samples stand for."""
-    factor = _blended(places.towards, light) if blend else 1.0
+def _edged(places: Places, light: Light, source: Source, edge: Callable[[Array], Array] | None) -> Places:
+    """Return places with another edge of a spot, and as a sphere lights them that samples stand for."""
+    factor = _over_own_edge(edge, places.towards, light) if edge else 1.0
     if source.centre is not None and isinstance(light, ReferenceLight):
         level = _level(places, light, source, source.centre)
         factor = np.divide(factor, level, out=np.zeros_like(level), where=level > 0)  # no sample sends to the others
@@ -354,11 +364,11 @@ def _whole_within(light: Light, blend: float) -> Light:
     return replace(light, beam=float(np.arccos(min(blend + (1 - blend) * np.cos(light.cutoff), 1.0))))
 
 
-def _blended(towards: Array, light: Light) -> Array:
-    """Return Blender's edge over that of a spot with the same ends, (n,): smoothstep of the cosine, linear in angle."""
-    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine:
+def _over_own_edge(edge: Callable[[Array], Array], towards: Array, light: Light) -> Array:
+    """Return an edge over that of a spot with the same ends, which is linear in the angle, (n,)."""
+    if isinstance(light, DirectionalLight) or light.axis is None or light.cosine or light.beam == light.cutoff:
         return np.ones(len(towards))
     cosine = np.clip(towards @ light.axis, -1.0, 1.0)
     part = np.clip((cosine - np.cos(light.cutoff)) / (np.cos(light.beam) - np.cos(light.cutoff)), 0.0, 1.0)
     linear = np.clip((light.cutoff - np.arccos(cosine)) / (light.cutoff - light.beam), 0.0, 1.0)
-    return np.divide(part * part * (3 - 2 * part), linear, out=np.zeros(len(cosine)), where=linear > 0)
+    return np.divide(edge(part), linear, out=np.zeros(len(cosine)), where=linear > 0)

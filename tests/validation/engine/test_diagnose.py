@@ -13,11 +13,12 @@ import pytest
 from analytic.errors import InputError
 from reference.quadrature.image import quadrature_image
 from reference.scene.read import read_reference
-from reference.storage.exr import Image
+from reference.storage.exr import NOTE, Image
 from tests.helpers.injected_faults import INJECTED
 from tests.helpers.scenes import FOG, scene_xml
+from validation.engine.curves import to_srgb
 from validation.engine.diagnose import diagnose_image
-from validation.engine.evidence import is_noise
+from validation.engine.evidence import Blocks
 from validation.engine.fault import Fault
 from validation.engine.light_faults import PLACE
 from validation.engine.prediction import Guess, SceneLight
@@ -98,14 +99,22 @@ def test_few_pixels_tell_no_fault_from_noise(variant):
         diagnosed(np.full((3, 4, 3), 0.02), size=(4, 3))
 
 
-def test_noise_is_of_one_size_all_over_the_image(reference):
-    generator = np.random.default_rng(2)
-    errors, pairs = 0.02 * generator.standard_normal((400, 3)), (np.arange(399), np.arange(1, 400))
-    lit = np.ones(errors.shape, bool)
-    explanation = Explanation((), (), Guess(scene_fog(reference)), errors, lit, float(np.abs(errors).mean()))
-    assert is_noise(explanation, pairs)
-    errors[::7] *= 20  # thin shadows that are off
-    assert not is_noise(explanation, pairs)
+def test_pixels_that_share_their_errors_count_as_fewer(reference):
+    """White noise has as many witnesses as pixels; errors of 4 x 4 pixels each have a sixteenth."""
+    (height, width), generator = (192, 256), np.random.default_rng(2)
+    blocks = Blocks.of(SimpleNamespace(shape=(height, width), pixels=np.arange(height * width)))
+    lit = np.ones((height * width, 3), bool)
+
+    def explanation(errors):
+        errors = np.repeat(errors.reshape(-1, 1), 3, axis=1)
+        return Explanation((), (), Guess(scene_fog(reference)), errors, lit, float(np.abs(errors).mean()))
+
+    white = explanation(0.02 * generator.standard_normal((height, width)))
+    shared = explanation(np.kron(0.02 * generator.standard_normal((height // 4, width // 4)), np.ones((4, 4))))
+    assert blocks.is_noise(white)
+    assert not blocks.is_noise(shared)
+    assert blocks.area(white.errors, lit) == pytest.approx(1, abs=0.3)
+    assert blocks.area(shared.errors, lit) == pytest.approx(16, rel=0.3)
 
 
 @pytest.mark.claim("diagnosis-right")
@@ -114,6 +123,68 @@ def test_no_fault_is_named_for_a_right_image(reference, noise):
     generator = np.random.default_rng(3)
     diagnosis = diagnosed(total(reference) * (1 + noise * generator.standard_normal((SIZE[1], SIZE[0], 1))))
     assert diagnosis.first == "right"
+    assert diagnosis.explained
+
+
+@pytest.mark.slow
+@pytest.mark.claim("diagnosis-injected")
+def test_an_explanation_that_ends_where_a_simpler_one_is_is_that_one(variant):
+    """Height fog with a scale height of kilometres is an extinction, though its number fits errors of an engine."""
+    loaded = load_scene("open-fog", SIZE)
+    own = read_reference(loaded.scene)
+    height = np.linspace(-1, 1, SIZE[1])[:, None, None]
+    image = total(replace(own, medium=replace(own.medium, sigma_t=1.332 * own.medium.sigma_t))) * (1 + 0.003 * height)
+    diagnosis = diagnose_image(Image({"total": image}), loaded, layer="total", pixel="centre")
+    assert diagnosis.first == "extinction"
+    assert diagnosis.ranked[0].parameters[0] == pytest.approx(1.332, rel=0.01)
+
+
+def marked_image(image):
+    """A frame counter in white."""
+    image = image.copy()
+    image[2:4, 3:8] = 1.0
+    return image
+
+
+def holed(image):
+    image = image.copy()
+    image[5:8, 20:24] = 0.0
+    return image
+
+
+@pytest.mark.claim("diagnosis-right")
+@pytest.mark.parametrize(
+    ("change", "words"), [(marked_image, "10 of 768 pixels"), (holed, "pixels, in columns 20 to 23")]
+)
+def test_few_wrong_pixels_are_said_and_never_nothing(reference, change, words):
+    """The comparison calls the image wrong: the diagnosis may not say that nothing is."""
+    diagnosis = diagnosed(change(total(reference)))
+    assert diagnosis.first == "unexplained"
+    assert not diagnosis.explained
+    assert words in diagnosis.few
+    assert "all is right but" in "\n".join(diagnosis.lines)
+    assert diagnosis.verdict.startswith("not right")
+
+
+def test_a_black_image_is_black(reference):
+    diagnosis = diagnosed(np.zeros((SIZE[1], SIZE[0], 3)))
+    assert diagnosis.first == "black"
+    assert [row.name for row in diagnosis.ranked] == ["black"]
+    assert "The image is black" in "\n".join(diagnosis.lines)
+
+
+def test_the_diagnosis_remembers_what_the_reader_of_the_file_said(reference):
+    image = Image({"total": total(reference)}, attributes={NOTE: "colours of other primaries"})
+    said = diagnose_image(image, load_scene("sphere-spot", SIZE), layer="total", pixel="centre")
+    assert "colours of other primaries" in "\n".join(said.lines)
+
+
+@pytest.mark.claim("diagnosis-two")
+@pytest.mark.parametrize("curve", [to_srgb, pytest.param(lambda x: to_srgb(x / (1 + x)), marks=pytest.mark.slow)])
+def test_an_exposure_before_a_curve_is_named_with_it(reference, curve):
+    diagnosis = diagnosed(curve(40 * total(reference)))
+    assert diagnosis.ranked[0].together == ("factor", "transfer" if curve is to_srgb else "tone-map")
+    assert diagnosis.ranked[0].parameters[0] == pytest.approx(40, rel=0.01)
     assert diagnosis.explained
 
 

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How often a diagnosis names a fault of a right image, and misses one of a faulty image: its two limits.
+
+`python docs/tools/calibrate_diagnosis.py` makes right images with the errors that engines have (noise, denoised noise,
+half resolution, froxels, small floats, few steps, history) and images with a fault of the catalogue under the same
+errors, lets the diagnosis search in each, and counts false names and misses for limits of the evidence and of the
+fraction of the error that an explanation leaves. From the scenes of `CALIBRATED` it chooses the limits and writes
+`validation/engine/calibration.json`, which the diagnosis reads; from those of `MEASURED`, other scenes and seeds, come
+the figures that count. Both are in `docs/data/diagnosis-calibration.json`, and docs/your-engine.md has its table.
+"""
+
+import argparse
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, zoom
+
+Array = NDArray[np.float64]
+
+ROOT = Path(__file__).resolve().parents[2]
+LIMITS = ROOT / "validation/engine/calibration.json"
+RECORD = ROOT / "docs/data/diagnosis-calibration.json"
+CALIBRATED = ("sphere-spot", "omni-box")
+MEASURED = ("open-fog", "two-pens", str(ROOT / "docs/examples/lobe-fog.xml"))
+_SIZE = (48, 36)
+_EVIDENCES = (10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 120.0, 200.0)
+_LEFTS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+_FALSE = 0.05  # of the right images: a name that is wrong costs a user more than one that is missing
+_WITHIN = 0.02  # of an image: the least change of a fault that is injected, which the comparison sees
+
+
+def _noise(size: tuple[int, int], rng: np.random.Generator) -> Array:
+    return rng.standard_normal((size[1], size[0], 1))
+
+
+def _white(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.Generator) -> Array:
+    return (fog + surface) * (1 + 0.05 * _noise(size, rng))
+
+
+def _denoised(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.Generator) -> Array:
+    smooth = gaussian_filter(_noise(size, rng), (2, 2, 0))
+    return (fog + surface) * (1 + 0.04 * smooth / smooth.std())
+
+
+def _half(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.Generator) -> Array:
+    """Fog at half of the resolution, enlarged linearly."""
+    return np.maximum(zoom(fog[::2, ::2], (2, 2, 1), order=1, grid_mode=True, mode="nearest"), 0) + surface
+
+
+def _froxels(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.Generator) -> Array:
+    """Fog in columns of 4 x 4 pixels, enlarged linearly."""
+    coarse = fog.reshape(size[1] // 4, 4, size[0] // 4, 4, 3).mean(axis=(1, 3))
+    return np.maximum(zoom(coarse, (4, 4, 1), order=1, grid_mode=True, mode="nearest"), 0) + surface
+
+
+def _small_floats(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.Generator) -> Array:
+    """Floats of 11, 11 and 10 bits, rounded down."""
+    mantissa, exponent = np.frexp(fog)
+    steps = np.array([128.0, 128.0, 64.0])
+    return np.ldexp(np.floor(mantissa * steps) / steps, exponent) + surface
+
+
+def _history(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.Generator) -> Array:
+    """Noise of the fog averaged over frames whose pixels move a little: a blur, and a tenth of the noise."""
+    return gaussian_filter(fog, (0.7, 0.7, 0)) * (1 + 0.03 * _noise(size, rng)) + surface
+
+
+#: What engines do to right and to faulty images; the march of few steps is one of the scene, see `_images`.
+ERRORS: dict[str, Callable[[Array, Array, tuple[int, int], np.random.Generator], Array]] = {
+    "white noise": _white,
+    "denoised noise": _denoised,
+    "half resolution": _half,
+    "froxels": _froxels,
+    "small floats": _small_floats,
+    "history": _history,
+}
+MARCH = "march of few steps"
+
+
+def _marched(scene: str, steps: int) -> Array:
+    """Return the airlight of a march of equal steps."""
+    import airlight
+
+    frame = airlight.render(scene, "ray-march", size=_SIZE, steps=steps)
+    return np.asarray(frame.airlight, dtype=float)
+
+
+def _images(scene: str, seed: int) -> list[dict[str, Any]]:
+    """Return images of a scene, right ones and one with a fault for each of these: rows without a diagnosis."""
+    from reference.scene.read import read_reference
+    from reference.storage.exr import Image
+    from validation.engine.fault import traits
+    from validation.engine.faults import FAULTS
+    from validation.engine.prediction import Guess, Predictor, SceneLight
+    from validation.engine.search import _own_starts
+    from validation.engine.seen import JudgedLayer, seen_image
+    from validation.scenes.loading import load_scene
+
+    rng = np.random.default_rng(seed)
+    loaded = load_scene(scene, _SIZE)
+    light = SceneLight(read_reference(loaded.scene))
+    shape = (_SIZE[1], _SIZE[0], 3)
+    blank = Image({"total": np.ones(shape)})
+    seen, _ = seen_image(blank, JudgedLayer("total", "total", blank.layers["total"]), loaded.scene)
+
+    def shown(guess: Any, values: Array | None = None) -> tuple[Predictor, Array, Array]:
+        predictor = Predictor(replace(seen, values=seen.values if values is None else values), light)
+        fog, surface = predictor.layers(guess)
+        return predictor, fog.reshape(shape), surface.reshape(shape)
+
+    plain = Guess(Predictor(seen, light).fog)
+    predictor, fog, surface = shown(plain)
+    right = fog + surface
+    predictor, _, _ = shown(plain, right.reshape(-1, 3))
+    there = traits(predictor)
+    possible = [fault for fault in FAULTS if all(there[need] for need in fault.needs) and fault.kind != "layers"]
+    rows = []
+    for error, make in (*ERRORS.items(), (MARCH, None)):
+        march = _marched(scene, 16) / np.maximum(fog, 1e-30) if make is None else np.ones(shape)
+        for _ in range(2):
+            values = make(fog, surface, _SIZE, rng) if make else fog * march + surface
+            rows.append({"scene": scene, "error": error, "fault": "right", "words": "nothing", "image": values})
+            if make in (_half, _froxels, _small_floats) or make is None:
+                break  # no random numbers
+        for _ in range(2):
+            while True:
+                fault = possible[rng.integers(len(possible))]
+                starts = [tuple(start) for start in _own_starts(predictor, fault, (), ())]
+                start = starts[rng.integers(len(starts))]
+                start = tuple(
+                    min(max(value * math.exp(rng.uniform(-0.2, 0.2)), number.low), number.high)
+                    for value, number in zip(start, fault.parameters, strict=True)
+                )
+                guess = fault.change(predictor, plain, start)
+                _, faulty_fog, faulty_surface = shown(guess)
+                whole = faulty_fog + faulty_surface
+                changed = guess.undo(whole) if guess.undo else whole
+                for change in guess.values:
+                    changed = change(changed.reshape(-1, 3)).reshape(shape)
+                apart = np.abs(changed - right) / np.maximum(np.maximum(changed, right), 1e-3 * right.mean())
+                if float(apart.mean()) > _WITHIN:
+                    break
+            values = make(faulty_fog, faulty_surface, _SIZE, rng) if make else faulty_fog * march + faulty_surface
+            values = guess.undo(values) if guess.undo else values
+            for change in guess.values:
+                values = change(values.reshape(-1, 3)).reshape(shape)
+            words = fault.sentence(start)
+            rows.append({"scene": scene, "error": error, "fault": fault.name, "words": words, "image": values})
+    return [row | {"light": light, "loaded": loaded} for row in rows]
+
+
+def _diagnosed(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row with what the diagnosis found, whatever the limits are."""
+    from reference.storage.exr import Image
+    from validation.engine.diagnose import diagnose_image
+
+    image = Image({"total": row["image"]}, attributes={"airlight:pixel": "centre", "airlight:scene": row["scene"]})
+    said = diagnose_image(image, row["loaded"], layer="total", pixel="centre", light=row["light"])
+    top = said.ranked[0] if said.ranked else None
+    return {
+        "scene": Path(row["scene"]).stem,
+        **{key: row[key] for key in ("error", "fault", "words")},
+        "found": top.name if top else said.first,
+        "says": top.words if top else "",
+        "together": list(top.together) if top else [],
+        "evidence": top.evidence if top else 0.0,
+        "residual": said.residual,
+        "left": said.left,
+        "rest": said.rest,
+        "place": said.place,
+    }
+
+
+def named(row: dict[str, Any], evidence: float, left: float) -> bool:
+    """Return whether a fault is named within limits, as `validation.engine.diagnose` does."""
+    if row["found"] in ("right", "black", "unexplained"):
+        return False
+    return bool(row["evidence"] > evidence and (row["rest"] or row["left"] < left * row["residual"]))
+
+
+def rates(rows: list[dict[str, Any]], evidence: float, left: float) -> tuple[float, float]:
+    """Return the fraction of right images with a name, and of faulty ones with the right name first."""
+    right = [row for row in rows if row["fault"] == "right"]
+    faulty = [row for row in rows if row["fault"] != "right"]
+    false = sum(named(row, evidence, left) for row in right) / max(len(right), 1)
+    found = sum(named(row, evidence, left) and row["found"] == row["fault"] for row in faulty) / max(len(faulty), 1)
+    return false, found
+
+
+def chosen_limits(rows: list[dict[str, Any]]) -> tuple[float, float]:
+    """Return the limits that name most faults, of those that name few right images; the strictest of equals."""
+    table = [(rates(rows, evidence, left), evidence, left) for evidence in _EVIDENCES for left in _LEFTS]
+    fit = [each for each in table if each[0][0] <= _FALSE] or table
+    (_, evidence, left) = max(fit, key=lambda each: (round(each[0][1], 6), -each[0][0], each[1], -each[2]))
+    return evidence, left
+
+
+def main() -> None:
+    """Make the images, diagnose them, and write the limits and the record."""
+    from reports.machine.environment import activate
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", choices=("calibrated", "measured"), help="these images; others keep their rows")
+    parser.add_argument("--limits", action="store_true", help="choose the limits again, from the rows that there are")
+    chosen = parser.parse_args()
+    activate()
+    from reference.storage.files import write_text
+
+    record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
+    for name, scenes, seed in (("calibrated", CALIBRATED, 1), ("measured", MEASURED, 1000)):
+        if chosen.limits or chosen.only not in (None, name):
+            continue
+        record[name] = []
+        for number, scene in enumerate(scenes):
+            for row in _images(scene, seed + number):
+                record[name].append(_diagnosed(row))
+                print(json.dumps(record[name][-1]), flush=True)
+                write_text(RECORD, json.dumps(record, indent=1) + "\n")
+    evidence, left = chosen_limits(record["calibrated"])
+    record |= {"command": "python docs/tools/calibrate_diagnosis.py", "evidence": evidence, "left": left}
+    record |= {"measured on": f"{datetime.now(UTC):%Y-%m-%d}", "size": _SIZE}
+    write_text(RECORD, json.dumps(record, indent=1) + "\n")
+    limits = {"command": record["command"], "evidence": evidence, "left": left}
+    write_text(LIMITS, json.dumps(limits, indent=1) + "\n")
+    for name in ("calibrated", "measured"):
+        false, found = rates(record.get(name, []), evidence, left)
+        print(
+            f"{name}: evidence {evidence:g}, left {left:g}: {100 * false:.1f} % false names, {100 * found:.1f} % named"
+        )
+
+
+if __name__ == "__main__":
+    main()
