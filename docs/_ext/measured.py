@@ -190,51 +190,6 @@ def numpy_faults() -> str:
     return _faults(said, rows)
 
 
-def diagnosis_limits() -> str:
-    """Return how often the diagnosis names a fault of a right image, and finds that of a faulty one, by its limits."""
-    record = json.loads((DATA / "diagnosis-calibration.json").read_text(encoding="utf-8"))
-    evidence, left = record["evidence"], record["left"]
-    cells = []
-    for error in dict.fromkeys(row["error"] for row in record["measured"]):
-        row = [error]
-        for name in ("calibrated", "measured"):
-            of_error = [each for each in record[name] if each["error"] == error]
-            row += _counts(of_error, evidence, left)
-        cells.append(row)
-    total = ["**all**"]
-    for name in ("calibrated", "measured"):
-        total += _counts(record[name], evidence, left)
-    head = ("error", "right images with a name", "faults named first", "right, other scenes", "faults, other scenes")
-    width, height = record["size"]
-    said = (
-        f"Limits: evidence {evidence:g}, and {100 * left:g} % of the error ({record['measured on']}, {width} x "
-        f"{height} pixels, `{record['command']}`)."
-    )
-    return f"{said}\n\n" + table([*head], [*cells, total], 1) + "\n\n" + _by_limit(record)
-
-
-def _counts(rows: list[dict[str, Any]], evidence: float, left: float) -> list[str]:
-    """Return how many right images have a name, and how many faults are named first, of how many."""
-    right = [row for row in rows if row["fault"] == "right"]
-    faulty = [row for row in rows if row["fault"] != "right"]
-    false = sum(_named(row, evidence, left) for row in right)
-    found = sum(_named(row, evidence, left) and row["found"] == row["fault"] for row in faulty)
-    return [f"{false} of {len(right)}", f"{found} of {len(faulty)}"]
-
-
-def _named(row: dict[str, Any], evidence: float, left: float) -> bool:
-    searched = row["found"] not in ("right", "black", "unexplained")
-    return searched and row["evidence"] > evidence and bool(row["rest"] or row["left"] < left * row["residual"])
-
-
-def _by_limit(record: dict[str, Any]) -> str:
-    """Return the counts of all images by the limit of the evidence."""
-    rows = record["calibrated"] + record["measured"]
-    limits = sorted({5.0, 10.0, 20.0, 40.0, 80.0, 160.0, record["evidence"]})
-    cells = [[f"{limit:g}", *_counts(rows, limit, record["left"])] for limit in limits]
-    return table(["least evidence", "right images with a name", "faults named first"], cells, 1)
-
-
 def _faults(said: str, rows: list[dict[str, Any]]) -> str:
     head = ("injected fault", "expected name", "named first", "words", "error", "left")
     several = "scene" in rows[0]

@@ -131,7 +131,7 @@ def compare(
         if diagnose or fit is not None:
             option = "diagnose" if diagnose else "fit"
             raise InputError(
-                f"{option}: got {test}, which stands for several files; expected one image: name one of the files"
+                f"{option}: got {test!s}, which stands for several files; expected one image: name one of the files"
             )
         exclude("compare", "several files are judged together", about | {"mask": mask, "margin": None})
         how: dict[str, Any] = {"layer": layer, "holds": holds, "pixel": pixel, "margin": margin}

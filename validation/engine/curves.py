@@ -105,7 +105,8 @@ def _to_cones(space: Sequence[tuple[float, float]]) -> Array:
 
 #: Matrices from colours with the primaries of sRGB to others, white to white, by the name of the others.
 PRIMARIES: Mapping[str, Array] = {
-    name: np.linalg.solve(_to_cones(space), _to_cones(_SRGB)) for name, space in _SPACES.items()
+    name: np.asarray(np.linalg.solve(_to_cones(space), _to_cones(_SRGB)), dtype=np.float64)
+    for name, space in _SPACES.items()
 }
 
 #: By what is said of an image.

@@ -154,7 +154,7 @@ def holed(image):
 
 @pytest.mark.claim("diagnosis-right")
 @pytest.mark.parametrize(
-    ("change", "words"), [(marked_image, "10 of 768 pixels"), (holed, "pixels, in columns 20 to 23")]
+    ("change", "words"), [(marked_image, "10 of 768 pixels"), (holed, "pixels, in columns 20 to 20 and rows 5 to 7")]
 )
 def test_few_wrong_pixels_are_said_and_never_nothing(reference, change, words):
     """The comparison calls the image wrong: the diagnosis may not say that nothing is."""
