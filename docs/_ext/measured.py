@@ -190,6 +190,30 @@ def numpy_faults() -> str:
     return _faults(said, rows)
 
 
+def diagnosis_limits() -> str:
+    """Return how often the diagnosis names a fault of a right image, and finds that of a faulty one, by its limits."""
+    record = json.loads((DATA / "diagnosis-calibration.json").read_text(encoding="utf-8"))
+    width, height = record["size"]
+    said = (
+        f"The limits are an evidence of {record['evidence']:g} and {100 * record['left']:g} % of the error "
+        f"({record['measured']}, {width} x {height} pixels, `{record['command']}`)."
+    )
+    head = ("right, first scenes", "faults, first scenes", "right, other scenes", "faults, other scenes")
+    parts = [
+        table([first, *head], [[key, *_counted(record[part], key)] for key in record[part]["measured"]])
+        for first, part in (("error of the engine", "by_error"), ("least evidence", "by_limit"))
+    ]
+    return "\n\n".join([said, "Right images that were given a name, and faults that were named first:", *parts])
+
+
+def _counted(counts: dict[str, Any], key: str) -> list[str]:
+    cells = []
+    for name in ("calibrated", "measured"):
+        count = counts[name][key]
+        cells += [f"{count['false']} of {count['right']}", f"{count['found']} of {count['faulty']}"]
+    return cells
+
+
 def _faults(said: str, rows: list[dict[str, Any]]) -> str:
     head = ("injected fault", "expected name", "named first", "words", "error", "left")
     several = "scene" in rows[0]

@@ -44,16 +44,16 @@ def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...
         if not number["meanFreePath"] > 0:
             raise ValueError(f"heightfog has meanFreePath = {number['meanFreePath']:g}; expected a length above 0 m")
         rise = max(number["maximumHeight"] - number["baseHeight"], _LEAST_DIFFERENCE)
-        return ((1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),), True
+        return ((1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),), _is_clamped(engine)
     if engine == "playcanvas":
-        return ((number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),), False
+        return ((number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),), _is_clamped(engine)
     factor = _UNREAL * (0.5 * number["ExtinctionScale"] if engine == "unreal-volumetric" else LN2**2)
     base, layers = number["FogHeight"], []
     for prefix, offset in (("", 0.0), ("Second", number["SecondFogHeightOffset"])):
         if number[f"{prefix}FogDensity"]:
             scale = 10 / (_above_zero(number, f"{prefix}FogHeightFalloff") * LN2)
             layers.append((factor * number[f"{prefix}FogDensity"], base + offset, scale))
-    return tuple(layers), False
+    return tuple(layers), _is_clamped(engine)
 
 
 def parameters_of(engine: str, layers: Sequence[Layer], *, clamped: bool, constant: float) -> dict[str, float] | str:
@@ -62,8 +62,8 @@ def parameters_of(engine: str, layers: Sequence[Layer], *, clamped: bool, consta
         return "it has no fog without a layer"
     if constant:
         return "it has no constant part"
-    if clamped != (engine == "hdrp"):
-        return "its layers are constant below their bases" if engine == "hdrp" else "its layers go on below their bases"
+    if clamped != _is_clamped(engine):
+        return f"its layers {'go on' if clamped else 'are constant'} below their bases"
     if len(layers) > (2 if engine.startswith("unreal") else 1):
         return "it has one layer"
     sigma_t, base, scale = layers[0]
@@ -78,6 +78,10 @@ def parameters_of(engine: str, layers: Sequence[Layer], *, clamped: bool, consta
         found["SecondFogDensity"] = sigma_t / factor
         found |= {"SecondFogHeightFalloff": 10 / (scale * LN2), "SecondFogHeightOffset": other - base}
     return found
+
+
+def _is_clamped(engine: str) -> bool:
+    return bool(ENGINES[engine].get("clamped", False))
 
 
 def _above_zero(number: Mapping[str, float], name: str) -> float:
