@@ -59,6 +59,7 @@ class Engine:
     end: float = math.inf
     planar: bool = False
     power: float = 2.0
+    soft: float = 0.0  # what is added to the squared distance [m^2]
     reach: float = math.inf
     segments: tuple[float, float] = (1.0, 1.0)  # to the camera, from the light
     moved: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of the first lamp, in the fog
@@ -151,7 +152,7 @@ def _light(engine: Engine, lamp: Lamp, point: Array, shadows: bool) -> tuple[Arr
     way = np.array(lamp.place) - point
     r = np.linalg.norm(way, axis=-1)
     way = way / r[..., None]
-    sent = r**-engine.power * np.maximum(1 - (r / engine.reach) ** 4, 0) ** 2
+    sent = (r**engine.power + engine.soft) ** -1.0 * np.maximum(1 - (r / engine.reach) ** 4, 0) ** 2
     if lamp.axis is not None:
         axis = np.array(lamp.axis) / np.linalg.norm(lamp.axis)
         sent = sent * (-(way @ axis) > math.cos(lamp.cutoff))
@@ -288,7 +289,15 @@ FAULTS_OF_LAYERS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("height-fog", "the scale height 0.7 times, and the base 0.6 m too high", {"layer": (0.8, 0.7 * 1.3)}),
     ("camera-path", "the way to the camera not attenuated, in height fog", {"segments": (0.0, 1.0)}),
 )
-CASES = (*((RIGHT, *fault) for fault in FAULTS), *((LAYERED, *fault) for fault in FAULTS_OF_LAYERS))
+LAWS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("distance-law", "one over the squared distance and 0.4 m^2", {"soft": 0.4}),
+    ("no-extinction", "nothing attenuated", {"segments": (0.0, 0.0)}),
+)
+CASES = tuple(
+    (engine, *fault)
+    for engine, faults in ((RIGHT, FAULTS), (LAYERED, FAULTS_OF_LAYERS), (RIGHT, LAWS))
+    for fault in faults
+)
 
 
 def main() -> None:

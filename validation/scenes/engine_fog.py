@@ -46,7 +46,9 @@ def layers_of(engine: str, given: Mapping[str, float]) -> tuple[tuple[Layer, ...
         rise = max(number["maximumHeight"] - number["baseHeight"], _LEAST_DIFFERENCE)
         return ((1 / number["meanFreePath"], number["baseHeight"], rise / math.log(1000.0)),), _is_clamped(engine)
     if engine == "playcanvas":
-        return ((number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),), _is_clamped(engine)
+        return ((number["density"], number["heightBase"], 1 / _above_zero(number, "heightFalloff")),), _is_clamped(
+            engine
+        )
     factor = _UNREAL * (0.5 * number["ExtinctionScale"] if engine == "unreal-volumetric" else LN2**2)
     base, layers = number["FogHeight"], []
     for prefix, offset in (("", 0.0), ("Second", number["SecondFogHeightOffset"])):

@@ -61,6 +61,8 @@ MISTAKES = (
         "compare open-fog image.exr --diagnose --all-metrics",
         "all pixels of one image; leave out all_metrics",
     ),
+    ("compare open-fog runs/#.exr --diagnose", "runs/#.exr, which stands for several files; expected one image"),
+    ("compare open-fog runs/#.exr --fit sigma_t", "fit: got runs/#.exr, which stands for several files"),
     ("compare open-fog image.exr --fit sigmat", "did you mean"),
     ("compare open-fog image.exr --fit sigma_t=", "expected NAME or NAME=VALUE"),
     ("compare smoke image.exr --fit sigma_t", "the medium is a density grid"),

@@ -180,6 +180,13 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
     assert (covered >= 177).all(), covered / trials
 
 
+@pytest.mark.parametrize("place", ["fog", "medium", "1"])
+def test_a_medium_without_bounds_has_the_name_of_the_file_too(variant, tmp_path, place):
+    reference = read_reference(load_scene(scene_file(tmp_path), (8, 6)).scene)
+    (unknown,) = read_unknowns([f"sigma_t:{place}"], reference, {})
+    assert unknown.scene == pytest.approx(0.31, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("names", "how", "words"),
     [

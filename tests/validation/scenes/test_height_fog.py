@@ -130,7 +130,9 @@ def test_parameters_come_back():
         layers = ((0.05, 1.7, 3.9), (0.01, 4.1, 11.3))[: 2 if engine.startswith("unreal") else 1]
         found = parameters_of(engine, layers, clamped=engine in ("hdrp", "playcanvas"), constant=0.0)
         assert np.ravel(layers_of(engine, found)[0]) == pytest.approx(np.ravel(layers), rel=1e-12)
-        assert isinstance(parameters_of(engine, layers, clamped=engine not in ("hdrp", "playcanvas"), constant=0.0), str)
+        assert isinstance(
+            parameters_of(engine, layers, clamped=engine not in ("hdrp", "playcanvas"), constant=0.0), str
+        )
 
 
 def test_a_scene_in_unreals_words(variant, tmp_path):
