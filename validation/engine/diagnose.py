@@ -223,19 +223,20 @@ def diagnose_image(
 
 def _concluded(said: Diagnosis, attempt: "_Attempt", compared: EngineComparison, few: str) -> Diagnosis:
     """Return a diagnosis with what a search has found."""
-    chosen, rows = attempt.chosen, attempt.ranked()
-    rest = attempt.rest(chosen)
-    if chosen.faults:
-        named = attempt.is_named(chosen)
-        first = chosen.names[0] if named else UNEXPLAINED
-    else:
+    chosen = attempt.chosen
+    if chosen.faults and attempt.is_named(chosen):
+        first = chosen.names[0]
+    elif attempt.blocks.is_noise(attempt.right) and compared.verdict.noise_alone:
         # Noise alone makes blocks differ: that is no fault, and the comparison says so too.
-        first = RIGHT if rest and compared.verdict.noise_alone else UNEXPLAINED
+        first, chosen = RIGHT, attempt.right
+    else:
+        first = UNEXPLAINED
+    rest = attempt.rest(chosen)
     explained = bool(rest) and first != UNEXPLAINED
     return replace(
         said,
         first=first,
-        ranked=tuple(rows[:_SHOWN]),
+        ranked=tuple(attempt.ranked(chosen)[:_SHOWN]),
         left=chosen.error,
         rest=rest,
         explained=explained,
@@ -339,7 +340,7 @@ class _Attempt:
         ordered = sorted(zip(weights, explanations, strict=True), key=lambda each: -each[0])
         most, best = ordered[0]
         alike = [each for weight, each in ordered if weight >= most - _ALIKE or self._is_same(each, best)]
-        return min(alike, key=lambda each: each.parameters)
+        return min(alike, key=lambda each: (each.parameters, len(each.faults)))
 
     def _is_same(self, one: Explanation, best: Explanation) -> bool:
         """Return whether an explanation is the image of the best one, and leaves hardly more."""
@@ -352,9 +353,8 @@ class _Attempt:
         scale, area = scale_of(least, self.pixel), self.blocks.area(least.errors, least.lit)
         return [evidence(each, self.right, scale, max(area, 1.0)) for each in explanations]
 
-    def ranked(self) -> list[Ranked]:
+    def ranked(self, chosen: Explanation) -> list[Ranked]:
         """Return all explanations in the order of evidence, the chosen one first."""
-        chosen = self.chosen
         singles = [each for each in self.found if len(each.faults) == 1]
         weights = dict(zip(map(id, [chosen, *singles]), self._evidence([chosen, *singles]), strict=True))
         rows = _rows(chosen, weights[id(chosen)])
