@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realtime.errors import InputError
+from realtime.transforms import host_matrix
 
 Array = NDArray[np.float64]
 
@@ -72,7 +73,7 @@ def rounding_notes(scene: Any) -> list[str]:
 
 
 def _place(plugin: Any) -> Array:
-    return np.array(plugin.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
+    return host_matrix(plugin.world_transform())[:3, 3]
 
 
 def _worst(scene: Any) -> Rounding | None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analytic.errors import InputError
+from reference.scene.transforms import matrix_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -72,7 +73,7 @@ def _placed(shape: Any, vertices: Array, faces: Index, normals: Array | None) ->
     """
     import mitsuba as mi
 
-    matrix = np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    matrix = matrix_of(mi.traverse(shape)["to_world"])
     mirrored = np.linalg.det(matrix[:3, :3]) < 0
     if mirrored and shape.class_name() != "Cylinder":
         faces = faces[:, ::-1]

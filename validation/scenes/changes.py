@@ -28,6 +28,7 @@ import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError, named_values, nearest
+from reference.scene.transforms import matrix_of
 from reference.storage.scene_digest import description_digest, give_description
 from validation.arrays import Array
 from validation.scenes.height_fog import NUMBERS
@@ -114,7 +115,7 @@ def move_shapes(scene, matrices: Mapping[str, Sequence[Sequence[float]]]) -> Non
                 turned = np.reshape(parameters[normals], (-1, 3)) @ matrix[:3, :3].T / np.cbrt(np.linalg.det(matrix))
                 parameters[normals] = type(parameters[normals])(turned.ravel())
         elif place in parameters:
-            moved = matrix @ np.array(parameters[place].matrix, dtype=np.float64).reshape(4, 4)
+            moved = matrix @ matrix_of(parameters[place])
             parameters[place] = type(parameters[place])(moved)
         else:
             raise InputError(f"objects: shape '{name}' cannot be moved; expected a mesh, rectangle, disk or sphere")
@@ -167,10 +168,6 @@ def _values(value: Any) -> Values:
     return tuple(float(number) for number in np.array(value, dtype=np.float64).ravel())
 
 
-def _matrix(part) -> Array:
-    return np.array(part.world_transform().matrix, dtype=np.float64).reshape(4, 4)
-
-
 # The camera -----------------------------------------------------------------------------------------------------------
 
 _AIM = ("origin", "target", "up")
@@ -180,7 +177,7 @@ def _of_camera(sensor) -> Iterable[Changeable]:
     parameters = mi.traverse(sensor)
     if "x_fov" not in parameters:
         return
-    matrix = _matrix(sensor)
+    matrix = matrix_of(sensor.world_transform())
     yield _point("camera.origin", matrix[:3, 3])
     yield _point("camera.target", matrix[:3, 3] + matrix[:3, 2])
     yield _point("camera.up", matrix[:3, 1], direction=True)
@@ -216,9 +213,9 @@ def _of_light(prefix: str, emitter) -> Iterable[Changeable]:
     if kind == "PointLight":
         yield _point(f"{prefix}.position", np.array(parameters["position"]))
     if kind == "SpotLight":
-        yield _point(f"{prefix}.position", _matrix(emitter)[:3, 3])
+        yield _point(f"{prefix}.position", matrix_of(emitter.world_transform())[:3, 3])
     if kind in ("SpotLight", "DirectionalEmitter"):
-        yield _point(f"{prefix}.direction", _matrix(emitter)[:3, 2], direction=True)
+        yield _point(f"{prefix}.direction", matrix_of(emitter.world_transform())[:3, 2], direction=True)
     for name, unit in _LIGHTS.items():
         if f"{name}.value" in parameters:
             value = _values(parameters[f"{name}.value"])
@@ -239,7 +236,7 @@ def _change_light(emitter, changed: Mapping[str, Values]) -> None:
 
 def _shining(emitter, like, changed: Mapping[str, Values]):
     """Return the transform of a light that shines along a direction from a position."""
-    matrix = _matrix(emitter)
+    matrix = matrix_of(emitter.world_transform())
     if "position" in changed:
         matrix[:3, 3] = changed["position"]
     if "direction" in changed:

@@ -31,6 +31,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from reference.scene.transforms import matrix_of
 from validation.scenes.engine_fog import ENGINES, layers_of
 
 NUMBERS = ("sigma_0", "sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2")
@@ -113,7 +114,7 @@ def _box(props: Any) -> tuple[float, float, list[float], Any]:
         raise ValueError(
             "heightfog has no to_world; expected the box of the fog: the unit cube from its floor to its cap"
         )
-    matrix = np.array(props["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    matrix = matrix_of(props["to_world"])
     height = float(np.linalg.norm(matrix[:3, 2]))
     if not (np.isfinite(matrix).all() and height > 0):
         raise ValueError("heightfog has a to_world without a height; expected its cap above its floor")

@@ -14,6 +14,7 @@ import numpy as np
 
 from analytic.errors import InputError
 from realtime.scene.mesh_adjacency import scene_of
+from reference.scene.camera import camera_matrix
 from validation.scenes.files.nodes import child, kind, of_kind, properties, references
 from validation.scenes.files.shapes import samples
 
@@ -97,7 +98,7 @@ class _Space:
         self._bounds = scene_of(bounds) if bounds else None
         self._around = sensor.get_medium()
         if self._bounds is not None:
-            camera = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)[:3, 3]
+            camera = camera_matrix(sensor)[:3, 3]
             self._around = self._at(camera[None] + np.array([[1e6, 2e6, 3e6]]), camera[None])[0]
 
     def _at(self, start: Any, towards: Any) -> list[Any]:

@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from analytic.errors import InputError
+from reference.scene.transforms import matrix_of
 from validation.arrays import Array
 from validation.scenes.files.nodes import kind, of_kind, properties, references
 
@@ -230,7 +231,7 @@ def _is_null(shape: Any) -> bool:
 
 
 def _matrix(shape: Any) -> Array:
-    return np.array(mi.traverse(shape)["to_world"].matrix, dtype=np.float64).reshape(4, 4)
+    return matrix_of(mi.traverse(shape)["to_world"])
 
 
 def _corners(matrix: Array) -> Array:
