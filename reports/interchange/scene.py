@@ -310,6 +310,6 @@ def _numbers(values: Any) -> list[float]:
 
 def _number(value: float) -> float:
     """Return a number that float32 rounded as the one that was meant: 0.91 instead of 0.9100000262260437."""
-    short = float(str(np.float32(value)))
+    short = float(np.format_float_scientific(np.float32(value)))  # str follows the print options of the process
     # A number with more digits than float32 holds is kept; + 0.0 removes the sign of a zero.
     return (short if abs(short - value) <= 1e-7 * abs(value) else float(value)) + 0.0

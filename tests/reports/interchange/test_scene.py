@@ -49,6 +49,13 @@ def test_camera_is_enough_to_make_mitsubas_rays(variant):
     np.testing.assert_allclose(np.cross(right, up), -forward, atol=1e-6)
 
 
+def test_a_description_does_not_follow_the_print_options_of_the_process(variant):
+    """Importing `colour`, as pictures do, sets the oldest ones: a mean free path of 9.090909 m became 9.09091 m."""
+    usual = described(size=(16, 12))
+    with np.printoptions(legacy="1.13"):
+        assert described(size=(16, 12)) == usual
+
+
 def test_medium_is_in_every_form_that_engines_ask_for(variant):
     medium = described()["medium"]
     assert medium["sigma_t"] == [0.31] * 3
