@@ -2,13 +2,14 @@
 """The cost and error of kernels: nanoseconds a ray with the error, all kernels and sizes in one run.
 
 Times are of frozen functions after warm-up, on rays that lie ready on the device: from Dr.Jit's kernel history (the
-kernel alone) and from the wall clock (launch and replay included). Errors are of float32 on the set W of
-`validation.kernels.rays.wide_rays`; the same rays, more of them, are timed.
+kernel alone) and from the wall clock (launch and replay included). The kernels of one phase function take turns. Errors
+are of float32 on the set W of `validation.kernels.rays.wide_rays`; the same rays, more of them, are timed.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from itertools import product
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain, product
 from typing import Any
 
 import drjit as dr
@@ -26,7 +27,7 @@ from realtime.scene.lights import Light
 from realtime.scene.media.medium import Homogeneous
 from realtime.scene.phase import named_phase
 from validation.arrays import Counted
-from validation.clock import time_repeated, timing_of
+from validation.clock import Piece, in_turns, timed, timing_of
 from validation.kernels.case_files import Cases
 from validation.kernels.cases import TABLE
 from validation.kernels.errors import errors_by_group
@@ -64,33 +65,52 @@ def bench_kernels(
     total = len(ladders) * len(phases)
     costs: list[KernelCost] = []
     for number, (phase, g) in enumerate(phases):
-        reference, timed = wide_rays(ERROR_RAYS, phase, g), wide_rays(RAYS, phase, g, reference=False)
+        reference, rays = wide_rays(ERROR_RAYS, phase, g), wide_rays(RAYS, phase, g, reference=False)
+        tried: list[Tried] = []
         for done, (family, default, sizes) in enumerate(ladders):
             if progress is not None:
                 progress(number * len(ladders) + done, total, f"{family}, {phase}")
             for size in sizes if number == 0 else (default,):
-                cost = measure(family, size, reference=reference, timed=timed)
-                if cost.refused is None or size == default:  # a size that the kernel does not have is left out
-                    costs.append(cost)
+                each = try_kernel(family, size, reference=reference, rays=rays)
+                if each.work is not None or size == default:  # a size that the kernel does not have is left out
+                    tried.append(each)
+        costs += timed_in_turns(tried)
     return costs
 
 
-def measure(family: str, size: int | None, *, reference: Cases, timed: Cases, seconds: float = 0.3) -> KernelCost:
-    """Measure the kernel 'family-size': its error on rays with known J, its time on others, of one phase function."""
+@dataclass(frozen=True)
+class Tried:
+    """A kernel with its errors, and the work that is to be timed; None where it refused."""
+
+    cost: KernelCost
+    work: Callable[[], Any] | None = None
+
+
+def try_kernel(family: str, size: int | None, *, reference: Cases, rays: Cases) -> Tried:
+    """Return the kernel 'family-size' with its error on rays with known J, and its work on others, of one phase."""
     name, phase, g = sized(family, size), reference.phase[0], float(reference.g[0])
-    kernel = find_kernel(name)
+    kernel, count = find_kernel(name), len(rays.x0)
     cost = KernelCost(kernel=name, family=family, size=size, phase=phase, g=g)
-    rays = len(timed.x0)
     if size is not None and family in KERNELS and next(iter(KERNELS[family].parameters), None) == "steps":
-        rays //= max(1, size // _MOST_STEPS)
+        count //= max(1, size // _MOST_STEPS)
     try:
         J = np.array(_frozen(kernel, reference)(), dtype=np.float64)
-        device, wall = times_per_ray(_frozen(kernel, timed, rays), rays, seconds)
+        work = _frozen(kernel, rays, count)
     except (InputError, RealtimeInputError) as reason:
-        return replace(cost, refused=str(reason))
+        return Tried(replace(cost, refused=str(reason)))
     error = errors_by_group(reference, J, "single", {"all": np.ones(len(J), dtype=bool)})["all"]
     cost = replace(cost, median=error.median, p99=error.p99, max=error.max, nonfinite=error.nan + error.infinite)
-    return replace(cost, rays=rays, device=device, wall=wall)
+    return Tried(replace(cost, rays=count), work)
+
+
+def timed_in_turns(tried: Sequence[Tried], seconds: float = 0.3) -> list[KernelCost]:
+    """Return the costs of kernels with their times: of the wall clock, and of the device where it tells them."""
+    works = [each.work for each in tried if each.work is not None]
+    for work in [*works, *works]:  # records, and replays once
+        timed(work)
+    pieces = [Piece(partial(_wall_and_device, work), seconds) for work in works]
+    spent = iter(list(chain(*rounds)) for rounds in in_turns(pieces))
+    return [each.cost if each.work is None else _with_times(each.cost, next(spent)) for each in tried]
 
 
 def speed_against_error(costs: Sequence[KernelCost]) -> list[ErrorLevel]:
@@ -160,26 +180,27 @@ def _frozen(kernel: Kernel, cases: Cases, rays: int | None = None) -> Callable[[
     return work
 
 
-def times_per_ray(work: Callable[[], Any], rays: int, seconds: float) -> tuple[RayTime | None, RayTime]:
-    """Return the time of the compiled kernels alone, where the device tells it, and of the wall clock [ns a ray]."""
-    whole = time_repeated(work, seconds=seconds)
-    times: list[Spent] = []
+def _wall_and_device(work: Callable[[], Any]) -> tuple[Spent, Spent]:
+    """Return what work takes by the wall clock, and what its compiled kernels alone do when it is done once more."""
+    wall = timed(work)[1]
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
-        for _ in range(max(5, min(whole.repetitions, 50))):
-            work()
-            dr.sync_thread()
-            ms = sum(entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,)))
-            times.append(Spent(1e-3 * ms))
-            dr.kernel_history_clear()
-    scale = 1e6 / rays
-    device, wall = (
+        timed(work)
+        ms = sum(entry.get("execution_time", 0.0) for entry in dr.kernel_history((dr.KernelType.JIT,)))
+        dr.kernel_history_clear()
+    return wall, Spent(1e-3 * ms)
+
+
+def _with_times(cost: KernelCost, spent: Sequence[tuple[Spent, Spent]]) -> KernelCost:
+    """Return the cost of a kernel with its times [ns a ray]."""
+    scale = 1e6 / cost.rays
+    wall, device = (
         RayTime(
             median=each.median_ms * scale,
             low=each.low_ms * scale,
             high=each.high_ms * scale,
             repetitions=each.repetitions,
         )
-        for each in (timing_of(times), whole)
+        for each in map(timing_of, zip(*spent, strict=True))
     )
-    return device if device.median > 0 else None, wall
+    return replace(cost, device=device if device.median > 0 else None, wall=wall)
