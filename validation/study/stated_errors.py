@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 r"""The errors that a method states for itself: a larger distance from the reference is a fault.
 
-Methods that claim to be exact except for rounding (the kernel `exact` along whole rays where nothing casts a shadow,
-and shadow planes in exact order) state three errors:
+Methods that claim to be exact (the kernel `exact` along whole rays where nothing casts a shadow, and shadow planes in
+exact order) state three errors:
 
-* **Rounding** of the pixel, `ROUNDING` of it.
+* **The integral**, `EXACT` of the pixel. That is more than rounding: a pixel is a sum of float32 values that cancel,
+  and beyond what its ends are worth it errs by at most 33 units 2^-24 of itself or of the mean of the image, whichever
+  is larger, in all built-in scenes without area lights and in `random:7` (64 x 48 pixels, 28 November 2026). In bounded
+  media rules with few nodes stand in the place of the kernel: 99 % of the pixels of `random:3` err by less than 4.7e-4.
 * **Ends.** A lit interval ends at a surface, at the bounds of a medium or at a shadow plane, at a distance x that is
   known to some units of float32. With s(x) the radiance that a metre of the ray scatters in full light, this error is x
   s(x) times `END`. It is small, but the lit length may be small, too: where a ray clips the edge of a medium by 37 um
@@ -40,8 +43,9 @@ from reference.visibility.distances import crossings
 from validation.arrays import Array, Index
 from validation.study.configuration import Configuration
 
-#: The error of methods that claim rounding alone, relative to the pixel, or to a thousandth of the mean in the dark.
-ROUNDING = 1e-3
+#: What methods that claim to be exact promise for the integral, relative to the pixel, or to a thousandth of the mean
+#: in the dark: twice the error of their rules in bounded media.
+EXACT = 1e-3
 
 END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval that a ray meets head on, relative to its distance
 
@@ -62,7 +66,7 @@ def stated_bound(chosen: Configuration, scene: Scene) -> float | None:
     if not plain or not (chosen.method == "shadow-planes" or whole_rays):
         return None
     media = [scene.medium, *(bounded.medium for bounded in scene.medium.bounded_media)]
-    bound = ROUNDING + max(_kinks(medium.phase) for medium in media)
+    bound = EXACT + max(_kinks(medium.phase) for medium in media)
     return bound if np.isfinite(bound) else None
 
 

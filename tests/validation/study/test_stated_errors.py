@@ -85,7 +85,7 @@ def test_a_chord_of_micrometres_errs_by_what_the_rounding_of_its_ends_is_worth()
     scattered = ALBEDO * SIGMA_T * INTENSITY / (4 * np.pi * distance**2)
     assert reference[lit, 0] == pytest.approx(chords(scene)[lit] * scattered, rel=2e-3)
     worth = bounds.worth_of_ends(scene, lit)
-    assert (error[lit] > bounds.ROUNDING * reference[lit]).any()  # so rounding of the pixel alone is no bound
+    assert (error[lit] > bounds.EXACT * reference[lit]).any()  # so what is promised of the pixel is no bound
     assert (error[lit] <= worth).all()
     assert error[lit].max() > 0.05 * worth.max()
     # The most where rays leave, by the face that they meet at the smaller angle, behind the whole chord.
@@ -116,7 +116,7 @@ def test_the_kinks_of_a_table_are_worth_a_quarter_of_its_bends(words, values):
     reference, error = errors(scene, "unshadowed")
     stated = bounds.stated_bound(configuration("unshadowed"), read_scene(scene))
     assert stated is not None
-    kinks = stated - bounds.ROUNDING
+    kinks = stated - bounds.EXACT
     relative = (error / reference).max()
     assert relative < 3e-6 + kinks
     if words == "murky":
