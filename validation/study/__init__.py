@@ -8,10 +8,11 @@ Read in this order:
 - `configuration.py`: a method with its kernel and parameters, by the names that a user gives;
 - `study.py`: a study from its TOML file, and its cells; those of ours are in `studies/`;
 - `row.py`: what comes of a cell: the columns of a row, with unit and meaning;
-- `frame_times.py`: the times of a frame and of its stages;
+- `frame_times.py`: a turn of a method: the times of a frame and of its stages;
+- `turns.py`: the times of cells that are compared, of one run, in turns;
 - `reference.py`: the reference that the cells of an image share;
 - `stated_errors.py`: the errors that methods state for themselves;
-- `run.py`: a cell is rendered, timed and compared, and becomes a row;
+- `run.py`: a cell is rendered and compared, and becomes a row;
 - `scene.py`: the study of one scene: reference, checks, rows, images;
 - `keys.py`: what decides the numbers of a row, as a digest;
 - `rows.py`: finished rows on disk, and their Parquet;
