@@ -7,7 +7,7 @@
    paths of their own leave of the image.
 3. The explanation with the most evidence is chosen, or the simplest of those that are as good (`evidence.py`).
 4. It is named if its evidence and the fraction of the error that it leaves are within the limits of the calibration
-   (`calibration.json`): of right images with the errors that engines have, at most 5 % are given a name by these.
+   (`calibration.json`): chosen so that of right images with errors of engines at most 5 % have a name.
 """
 
 import os
