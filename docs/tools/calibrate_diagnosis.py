@@ -72,7 +72,7 @@ def _history(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.G
     return gaussian_filter(fog, (0.7, 0.7, 0)) * (1 + 0.03 * _noise(size, rng)) + surface
 
 
-#: What engines do to right and to faulty images; the march of few steps is one of the scene, see `_images`.
+#: Errors of engines, in right and in faulty images; the march of few steps is one of the scene, see `_images`.
 ERRORS: dict[str, Callable[[Array, Array, tuple[int, int], np.random.Generator], Array]] = {
     "white noise": _white,
     "denoised noise": _denoised,
@@ -206,7 +206,8 @@ def counts(rows: list[dict[str, Any]], evidence: float, left: float) -> dict[str
 def chosen_limits(rows: list[dict[str, Any]]) -> tuple[float, float]:
     """Return the limits that name most faults, of those that name few right images.
 
-    Of equals, the least fraction that may be left, and the middle of the evidences: it is farthest from both errors.
+    Equals are decided by the least fraction that may be left, and by the middle of the evidences: it is farthest from
+    both errors.
     """
     table = [(counts(rows, evidence, left), evidence, left) for evidence in _EVIDENCES for left in _LEFTS]
     few = [each for each in table if each[0]["false"] <= _FALSE * each[0]["right"]] or table

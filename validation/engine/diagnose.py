@@ -161,9 +161,9 @@ def diagnose_image(
     pixel
         'centre' or 'area'; by default what the image says of itself, or what fits better.
     light
-        Of this scene, as other images of it have found it.
+        The light of this scene, as other images of it have found it.
     reference_of
-        What computes the scene's reference for 'centre' or 'area'.
+        A function that computes the scene's reference for 'centre' or 'area'.
     progress
         Called with (fraction done, what).
 
