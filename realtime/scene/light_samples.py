@@ -87,17 +87,19 @@ def light_tables(lights: Sequence[Light]) -> tuple[LightTable, ...]:
 
 
 def _table(numbers: list[int], lights: list[Light]) -> LightTable:
-    arrays = [list(_arrays(light)) for light in lights]
-    read = host_numbers(*(array for own in arrays for array in own))
-    columns, every = [], len(arrays[0])
-    for place, array in enumerate(arrays[0]):
+    arrays = list(_arrays(lights[0]))
+    # All in one transfer, as each waits for the device: the arrays, and by name those that a power is made of.
+    wanted = [[*_arrays(light), light.intensity, *([] if light.cone is None else [light.cone.cos])] for light in lights]
+    read = host_numbers(*(array for of_light in wanted for array in of_light))
+    columns, every = [], len(wanted[0])
+    for place, array in enumerate(arrays):
         values = np.stack(read[place::every])
         scalar = type(array.x) if dr.depth_v(array) > 1 else type(array)
         columns += [aligned_array(scalar, column) for column in values.T]
     Float = type(lights[0].position.x)
-    power = np.stack(host_numbers(*(light.intensity for light in lights))).mean(axis=1)
+    power = np.stack(read[len(arrays) :: every]).mean(axis=1)
     if lights[0].cone is not None:
-        power = power * (1 - np.concatenate(host_numbers(*(light.cone.cos for light in lights))))
+        power = power * (1 - np.concatenate(read[len(arrays) + 1 :: every]))
     power = power if power.sum() > 0 else np.ones(len(lights))
     sums = np.cumsum(power) / power.sum()
     return LightTable(
