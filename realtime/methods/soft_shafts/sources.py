@@ -22,12 +22,11 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
 from realtime.methods.interface.method import View
 from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
-from realtime.numerics.array_types import aligned_array, two_numbers
+from realtime.numerics.array_types import two_numbers
 from realtime.scene.camera import Camera
 from realtime.scene.light_samples import LightTable, light_tables
 from realtime.scene.lights import Light
@@ -54,14 +53,15 @@ def source_state(
         maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
         return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
     (table,) = light_tables(lights)
-    positions = np.stack([np.array(column, dtype=np.float64) for column in table.columns[:3]])
-    # The mean square distance from the middle of a square of the side L is L^2 / 6.
-    spread = np.mean(np.sum((positions - positions.mean(axis=1, keepdims=True)) ** 2, axis=0))
+    # The mean square distance from the middle of a square of the side L is L^2 / 6. It stays on the device.
+    spread = sum(dr.mean(dr.square(column - dr.mean(column))) for column in table.columns[:3])
     hemispheres = None
     if with_maps:
         hemispheres = cast_hemisphere_maps(scene, table, lights[0], size, for_surfaces=for_surfaces)
     flat = all(light.facing is lights[0].facing for light in lights)
-    return SourceState(table, aligned_array(Float, np.array([np.sqrt(6 * spread)])), flat, hemispheres)
+    width = dr.sqrt(6 * spread)
+    dr.eval(width)
+    return SourceState(table, width, flat, hemispheres)
 
 
 @dataclass(frozen=True)
