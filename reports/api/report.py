@@ -87,10 +87,10 @@ class Report(Result):
 
     @property
     def lines(self) -> Sequence[str]:
-        """Where it was written, and when its times were measured."""
+        """Where it was written."""
         count = len(self.data.scenes)
         page = f"{self.page}: {count} scene{'' if count == 1 else 's'}, {self.done}"
-        return [page, *(claim.text for claim in self.data.claims if claim.kind == "times"), *self.figures]
+        return [page, *self.figures]
 
     @property
     def title(self) -> str:
