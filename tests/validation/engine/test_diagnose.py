@@ -179,8 +179,9 @@ def test_the_diagnosis_remembers_what_the_reader_of_the_file_said(reference):
     assert "colours of other primaries" in "\n".join(said.lines)
 
 
+@pytest.mark.slow
 @pytest.mark.claim("diagnosis-two")
-@pytest.mark.parametrize("curve", [to_srgb, pytest.param(lambda x: to_srgb(x / (1 + x)), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("curve", [to_srgb, lambda x: to_srgb(x / (1 + x))], ids=["sRGB", "x/(1+x), sRGB"])
 def test_an_exposure_before_a_curve_is_named_with_it(reference, curve):
     diagnosis = diagnosed(curve(40 * total(reference)))
     assert diagnosis.ranked[0].together == ("factor", "transfer" if curve is to_srgb else "tone-map")
