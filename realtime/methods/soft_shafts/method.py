@@ -185,7 +185,9 @@ class _Frame:
         there = dr.isfinite(view.distance)
         point = view.origin + view.direction * dr.select(there, view.distance, 0)
         if lights[0].facing is None:
-            return [there & view.visible(point, lights[0])]
+            # Twenty units in the last place towards the camera: rounded behind its surface, a point is in its shadow.
+            before = view.origin + view.direction * dr.select(there, view.distance * (1 - 2e-6), 0)
+            return [there & view.visible(before, lights[0])]
         state = self.states[number]
         if p.filter == "none" and not p.interleave:
             return [there & self._reached(state, place, light, point) for place, light in enumerate(lights)]
