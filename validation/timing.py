@@ -14,9 +14,9 @@ from typing import Literal
 from validation.columns import column
 
 #: Repetitions of an anchor at each end of a round. A median of n repetitions that scatter by a standard deviation s has
-#: the standard error 1.253 s/sqrt(n), and quartiles lie 1.349 s apart. Of ten medians, of five rounds with two ends,
-#: the farthest two are less than 5.16 standard errors apart in 99 runs of 100, by the normal law: that is the distance
-#: of the quartiles for n = (5.16 * 1.253/1.349)^2 = 23, so that a machine which does not change passes.
+#: the standard error 1.253 s/sqrt(n), and quartiles lie 1.349 s apart. Five rounds with two ends have ten medians, of
+#: which the farthest two are less than 5.16 standard errors apart in 99 runs of 100, by the normal law: that is the
+#: distance of the quartiles for n = (5.16 * 1.253/1.349)^2 = 23, so that a machine which does not change passes.
 ANCHORS = 25
 
 

@@ -78,7 +78,7 @@ class Mutation:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the tests said of a mutation."""
+    """The answer of the tests to a mutation."""
 
     mutation: Mutation
     survived: bool

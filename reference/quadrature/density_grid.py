@@ -43,7 +43,7 @@ class GridField:
 
     @property
     def bound_kind(self) -> BoundKind:
-        """What the errors are: second derivatives jump within pieces, where two rules may both be wrong."""
+        """The kind of the errors: second derivatives jump within pieces, where two rules may both be wrong."""
         return "estimated"
 
     @property

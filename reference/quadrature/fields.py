@@ -29,7 +29,7 @@ class Field(Protocol):
 
     @property
     def bound_kind(self) -> BoundKind:
-        """What the errors of `sums` are."""
+        """The kind of the errors of `sums`."""
 
     @property
     def strongest(self) -> Array:

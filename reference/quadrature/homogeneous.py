@@ -52,7 +52,7 @@ class HomogeneousField:
 
     @property
     def bound_kind(self) -> BoundKind:
-        """What the errors are: on pieces where the integrand is analytic, the worse of two rules bounds the better."""
+        """The kind of the errors: the integrand is analytic on a piece, and the worse rule bounds the better one."""
         return "proven"
 
     @property

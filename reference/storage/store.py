@@ -136,7 +136,7 @@ def stored(
     Parameters
     ----------
     inputs:
-        What decides the result.
+        All that decides the result.
     compute:
         Computes it; called if it is not cached.
     kind:
@@ -232,7 +232,7 @@ def drop(key: str | None) -> None:
 
 
 class Ledger:
-    """What computing from nothing takes: the time since now, and the original times of results that are loaded."""
+    """The cost of computing from nothing: the time since now, and the original times of results that are loaded."""
 
     def __init__(self) -> None:
         self._took, self.loaded = stopwatch(), Spent()

@@ -43,8 +43,9 @@ def in_own_process(
 ) -> Any:
     """Call a function in a new process; return what it returns, raise what it raises.
 
-    What a function yields is yielded here: the process goes on to the next value when that is asked for, and ends with
-    the last one, or when the iterator that is returned here is closed. The variant is the current one by default.
+    Values that a function yields are yielded here: the process goes on to the next value when that is asked for.
+    It ends with the last one, or when the iterator that is returned here is closed. The variant is by default the
+    current one.
 
     The function is at the top of a module of ours and prints nothing on the output; arguments and result are pickled.
     `what` and `name` name the work in messages. If it takes longer than `limit` [s] to the result, or to a value that

@@ -172,7 +172,7 @@ def methods(
         for at, each in enumerate(useful):
             tell(0.5 * at / len(useful), each.label)
             measured.append(cell(each))
-        # What was rendered is timed, all in turns.
+        # Methods that were rendered are timed, all in turns.
         path = str(scene.path or scene.name)
         asked = [
             Cell(path, scene.size, (), each, measure) if row.status == "done" else None

@@ -366,7 +366,7 @@ def motion_verdict(measures: Measures, reference_error: float | None = None) -> 
             reason = "what the frames hold of earlier ones is rounding"
         return MotionVerdict("cannot be told", f"no lag can be told: {reason}; {noise}")
 
-    # What is left is noise and a factor.
+    # The rest is noise and a factor.
     gain, factor = measures.lag.gain, ""
     if gain.value is not None and Estimate(gain.value - 1, gain.error).within(_FACTOR, SURE) is Answer.NO:
         factor = f", and a factor of {gain.value:.5g}"

@@ -14,7 +14,7 @@ bias looks like a lag.
 `described` is the improvement of a lag over no filter, as a fraction of the improvement of the impulse response.
 
 **Which delay.** It is whole, so it has no standard error: leaving out a block moves it by nothing or by a whole frame.
-What can be told is by how much the second-best delay is worse, each with the persistence that suits it best:
+The record tells by how much the second-best delay is worse, each with the persistence that suits it best:
 `delay_margin` is the fraction of the sum of squares of the second-best delay that the best one does not leave, with its
 error from blocks.
 

@@ -89,7 +89,7 @@ def first_frame(renderer: FrameRenderer) -> FrameCache:
 
 @dataclass(frozen=True)
 class FrameSpent:
-    """What the frames of one turn took, by the names of `FrameTimes`; None for what was not asked for."""
+    """The times of the frames of one turn, by the names of `FrameTimes`; None for what was not asked for."""
 
     frame: Spent
     airlight: Spent
@@ -108,7 +108,7 @@ def whole_turn(renderer: FrameRenderer) -> Turn:
     """Return a turn whose frames are timed as wholes, each by itself, with their two largest stages."""
 
     def turn() -> list[FrameSpent]:
-        # What the method prepares on the host goes on while the device is busy with the surface: no sum of stages.
+        # The preparation on the host goes on while the device is busy with the surface: no sum of stages.
         (_, cache), light_moved = timed(moved_light(renderer))
         (cast, by_light), surface = timed(partial(_ready, run_cast_and_shade, renderer))
         airlight = timed(partial(_ready, run_method, renderer, cache.state, cast, by_light))[1]

@@ -43,8 +43,8 @@ from reference.visibility.distances import crossings
 from validation.arrays import Array, Index
 from validation.study.configuration import Configuration
 
-#: What methods that claim to be exact promise for the integral, relative to the pixel, or to a thousandth of the mean
-#: in the dark: twice the error of their rules in bounded media.
+#: The error of the integral that methods promise which claim to be exact, relative to the pixel, or to a thousandth of
+#: the mean in the dark: twice the error of their rules in bounded media.
 EXACT = 1e-3
 
 END = 8 * 2.0**-24  #: uncertainty of the end of a lit interval that a ray meets head on, relative to its distance

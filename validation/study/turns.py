@@ -42,8 +42,8 @@ from validation.study.reference import load_cell
 from validation.study.study import Cell, Measure
 from validation.timing import ANCHORS, FrameTimes, TimingRun, anchored
 
-#: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``. What a
-#: function yields is yielded here, as it is asked for.
+#: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``. Values
+#: that a function yields are yielded here, as they are asked for.
 Apart = Callable[..., Any]
 
 #: What `turns_of` yields: `Ready`, then lists of `FrameSpent`.
@@ -78,7 +78,7 @@ class CellTimes:
 
 @dataclass(frozen=True)
 class Ready:
-    """What is known of a method before its first turn."""
+    """The facts of a method before its first turn."""
 
     took: float  #: by a frame with its preparation [s]
     memory: float | None = None  #: [MiB]

@@ -19,7 +19,7 @@ Rules say what rounding and a method's discretisation allow:
 - *Moved*, coordinates are rounded: those of 32 m to 2e-6 m. A ray that passes a light at 2 cm has its airlight to 1e-4.
   Of 192 rays 2 % may graze an edge, and meet the other side of it.
 - *Maps of shadows* have texels along the axes of the world, or about an axis that follows from them. A turn by a right
-  angle at least moves faces onto faces. What is left is as large as the error of the texels, which the difference to
+  angle at least moves faces onto faces. The rest is as large as the error of the texels, which the difference to
   a map with four times as many on a side measures; both images have it, and one half more is for chance.
 - *Froxels* end where the light of the farthest lamp fades: lights add up between grids with the same end.
 - *A draw* of one light in many is right in the mean alone: a noisy method is asked nothing of sums.
@@ -61,7 +61,7 @@ MOVE = (3.7, -2.9, 1.3)  # [m]
 
 @dataclass(frozen=True)
 class Image:
-    """What a scene looks like; None for a scene that the method refuses."""
+    """The image of a scene; None for a scene that the method refuses."""
 
     airlight: Any
     surface: Any

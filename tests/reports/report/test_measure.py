@@ -267,7 +267,7 @@ def test_files_appear_when_the_block_ends(tmp_path):
 
 @pytest.mark.claim("files-whole-or-not-at-all")
 def test_two_reports_never_mix_in_one_folder(tmp_path):
-    """Of two at once the second is refused; of two in turn the images of the first go, and a user's file stays."""
+    """The second of two at once is refused; a later one drops the images of the first, and keeps a user's file."""
     folder = write_report_files(tmp_path / "r")
     (folder / "mine.txt").write_text("mine")
     images = set(named_files(small_report()))
