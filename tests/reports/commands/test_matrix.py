@@ -53,7 +53,7 @@ multiple = [2, 1]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command printed, and how it ended."""
+    """The output of a command, and its status."""
 
     status: int
     out: str
@@ -221,7 +221,9 @@ def chosen(kind: str) -> tuple[str, str, str]:
 
 
 @pytest.mark.claim("every-command-on-every-kind")
-@pytest.mark.parametrize("kind", [pytest.param(each, marks=[] if each in QUICK else pytest.mark.slow) for each in KINDS])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(each, marks=[] if each in QUICK else pytest.mark.slow) for each in KINDS]
+)
 def test_every_command_on_this_kind(variant, kind, tmp_path, monkeypatch):
     path = write_kind(kind, tmp_path)
     estimator, method, measured = chosen(kind)
