@@ -47,14 +47,15 @@ def data_folder() -> Path:
 @pytest.fixture(scope="session")
 def variant() -> str:
     """The best Mitsuba variant that works on this machine, made current."""
-    from reports.machine.environment import activate
+    from reports.machine.environment import LEAST_THREADS, activate
 
     chosen = activate()
     # Workers have a core each: more threads would wait for one another. `tests/realtime/frame/test_threads.py` has all.
     if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
         import drjit as dr
 
-        dr.set_thread_count(max(1, len(os.sched_getaffinity(0)) // int(os.environ["PYTEST_XDIST_WORKER_COUNT"])))
+        cores = len(os.sched_getaffinity(0)) // int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+        dr.set_thread_count(max(LEAST_THREADS, cores))
     # Imported modules stay: `_nothing_left_behind` need not look through them after every module.
     gc.collect()
     gc.freeze()

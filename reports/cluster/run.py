@@ -173,7 +173,9 @@ def _check(worker: Any, made: Any) -> None:
             raise _Refused(f"worker {worker.address} cannot do the work ({type(error).__name__}: {error})") from None
         import drjit as dr
 
-        dr.set_thread_count(worker.state.nthreads)
+        from reports.machine.environment import LEAST_THREADS
+
+        dr.set_thread_count(max(LEAST_THREADS, worker.state.nthreads))
     if differences := made.differences(worker.airlight_made):
         raise _Refused(f"worker {worker.address} has {', '.join(differences)}")
 

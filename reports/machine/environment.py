@@ -38,6 +38,11 @@ class MissingError(RuntimeError):
     """
 
 
+#: Threads of Dr.Jit. With one, Mitsuba 3.9.1 never ends reading or writing an EXR file: its tasks wait for a thread
+#: beside the caller, and there is none. A machine of one core has one by default.
+LEAST_THREADS = 2
+
+
 @dataclass(frozen=True)
 class Prepared:
     """The choices of the check before the first kernel."""
@@ -105,8 +110,11 @@ def activate(variant: str | None = None) -> str:
         mi.set_variant(chosen.variant)
     except ImportError as error:  # the library exists but cannot be loaded
         raise MissingError(f"{chosen.variant} does not start ({error}); see `airlight doctor`") from error
+    import drjit as dr
+
     from reports.machine.mitsuba_log import log_to_error_stream
 
+    dr.set_thread_count(max(LEAST_THREADS, dr.thread_count()))
     log_to_error_stream()
     return chosen.variant
 

@@ -3,6 +3,7 @@
 
 import json
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from reports.machine.environment import MissingError, missing_packages, prepare
 from reports.machine.llvm import find_llvm
 from reports.machine.own_process import EndedError
 
+ROOT = Path(__file__).resolve().parents[3]
 HEADER = Path(sys.executable).read_bytes()[:64]  # of a binary that suits this machine
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks at ELF files and Linux' library names")
@@ -189,3 +191,20 @@ def test_the_cache_is_shown_and_cleared(filled, monkeypatch):
     assert (cleared.cache.removed, cleared.cache.freed, cleared.cache.files) == (6, size, 0)
     assert not list(filled.rglob("*.npz"))
     assert cleared.status == 0
+
+
+@linux
+def test_files_of_mitsuba_are_read_on_one_core(tmp_path):
+    """With one thread Mitsuba waits for ever: a scene with a texture never came on a machine of one core."""
+    code = (
+        "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+        "from reports.machine.environment import activate\n"
+        "activate()\n"
+        "import mitsuba as mi, numpy as np\n"
+        "mi.Bitmap(np.ones((3, 4, 3), np.float32)).write('one.exr')\n"
+        "print(*mi.Bitmap('one.exr').size())"
+    )
+    world = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", code]
+    ran = subprocess.run(command, cwd=tmp_path, env=world, capture_output=True, text=True, timeout=120)
+    assert ran.stdout.split() == ["4", "3"], ran.stderr
