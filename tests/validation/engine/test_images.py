@@ -25,7 +25,7 @@ def reference_of(pixel):
     brighter = 1 + 0.1 * (pixel == "area") * (AIRLIGHT > 1)
     layers = {"airlight": brighter * AIRLIGHT, "surface": brighter * SURFACE, "emitted": None}
     bounds = {"airlight_bound": 0 * AIRLIGHT, "airlight_se": None, "surface_se": None}
-    return SimpleNamespace(**layers, **bounds, light_angle=np.ones(SHAPE[:2]))
+    return SimpleNamespace(**layers, **bounds, light_angle=np.ones(SHAPE[:2]), bound_kind="proven")
 
 
 def written(folder, name, **layers):
