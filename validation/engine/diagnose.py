@@ -334,18 +334,20 @@ class _Attempt:
     def _best(self, explanations: Sequence[Explanation]) -> Explanation:
         """Return the explanation with the most evidence, or the simplest of those that are as good.
 
-        One with more numbers that ends where a simpler one is, such as fog of a scale height of 10 km, is the simpler.
+        A further number is worth its error only where the simpler explanation leaves more than little: fog of a scale
+        height of 10 km is an extinction, and one of 90 m that fits a rest of 0.1 % is it too.
         """
         weights = self._evidence(explanations)
         ordered = sorted(zip(weights, explanations, strict=True), key=lambda each: -each[0])
         most, best = ordered[0]
-        alike = [each for weight, each in ordered if weight >= most - _ALIKE or self._is_same(each, best)]
+        alike = [each for weight, each in ordered if weight >= most - _ALIKE or self._is_as_good(each, best)]
         return min(alike, key=lambda each: (each.parameters, len(each.faults)))
 
-    def _is_same(self, one: Explanation, best: Explanation) -> bool:
-        """Return whether an explanation is the image of the best one, and leaves hardly more."""
+    def _is_as_good(self, one: Explanation, best: Explanation) -> bool:
+        """Return whether an explanation is nearly the image of the best one, and leaves little or hardly more."""
         apart = float(np.abs(one.errors - best.errors).mean())
-        return apart <= _LITTLE * self.right.error and one.error <= (1 + _LITTLE) * best.error
+        leaves_little = bool(one.faults) and self._is_little(one)
+        return apart <= _LITTLE * self.right.error and (leaves_little or one.error <= (1 + _LITTLE) * best.error)
 
     def _evidence(self, explanations: Iterable[Explanation]) -> list[float]:
         """Return the evidence of explanations, by what the best of all leaves."""
