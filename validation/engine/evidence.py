@@ -3,7 +3,7 @@
 
 **Evidence.** With e the relative errors of n pixels and s their scale in the best explanation, the logarithm of
 Cauchy's likelihood is -sum log(1 + (e/s)^2). Channels of a pixel share their noise, so that three values count as one.
-An explanation gains that of its errors over that of the unchanged scene's.
+The evidence of an explanation is this logarithm for its errors minus the logarithm for the unchanged scene.
 
 Neighbouring pixels share their errors where an image was denoised, has fog of a low resolution, or leans on its last
 frames; such pixels are no independent witnesses. Blocks of B x B pixels say how many count as one: with S the sum of

@@ -38,7 +38,7 @@ def _softened(r: Array, size: float) -> Array:
 
 
 def _of_a_disk(r: Array, radius: float) -> Array:
-    """Return the light of a disk that faces a point over that of a point light: its cosine is that of a place."""
+    """Return the light of a disk at a point that it faces, as a fraction of the light of a point light."""
     return 2 * r**2 / (r**2 + radius**2 + r * np.sqrt(r**2 + radius**2))
 
 
