@@ -347,7 +347,10 @@ class _Attempt:
         """Return whether an explanation is nearly the image of the best one, and leaves little or hardly more."""
         apart = float(np.abs(one.errors - best.errors).mean())
         leaves_little = bool(one.faults) and self._is_little(one)
-        return apart <= _LITTLE * self.right.error and (leaves_little or one.error <= (1 + _LITTLE) * best.error)
+        # An explanation that leaves noise alone is better than one that does not, by however little.
+        noise_too = self.blocks.is_noise(one) or not self.blocks.is_noise(best)
+        hardly_more = noise_too and one.error <= (1 + _LITTLE) * best.error
+        return apart <= _LITTLE * self.right.error and (leaves_little or hardly_more)
 
     def _evidence(self, explanations: Iterable[Explanation]) -> list[float]:
         """Return the evidence of explanations, by what the best of all leaves."""

@@ -290,12 +290,18 @@ MEDIUM = (
         )
         for distance in _USUAL_NEAR
     ),
-    Fault(
-        "near-plane",
-        "the medium is missing up to {0:.4g} m before the camera: its near plane",
-        _between(False, "near"),
-        (Number(0.0, np.inf, (0.05, 0.2, 0.5, 1.0)),),
-        needs=("no bounds",),
+    *(
+        Fault(
+            "near-plane",
+            f"the medium is missing up to {{0:.4g}} m {words}",
+            _between(spherical, "near"),
+            (Number(0.0, np.inf, (0.05, 0.2, 0.5, 1.0)),),
+            needs=("no bounds",),
+        )
+        for words, spherical in (
+            ("before the camera: its near plane", False),
+            ("away from the camera, along each ray: a start distance", True),
+        )
     ),
     *(
         Fault(
