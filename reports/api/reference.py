@@ -241,7 +241,7 @@ def _sampled(
         scene=loaded.name,
         image=found.image,
         estimator=estimator,
-        relative_error=found.errors["pooled"],
+        relative_error=float("nan") if found.errors.pooled is None else found.errors.pooled,
         how=found,
     )
 

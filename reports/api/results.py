@@ -249,7 +249,7 @@ class Reference(LayeredImage):
 
     @property
     def passed(self) -> bool:
-        """Whether the error that was asked for was reached."""
+        """Whether the error that was asked for is known to be reached."""
         return not isinstance(self.how, MonteCarloReference) or self.how.reached is not False
 
     @property
@@ -276,9 +276,7 @@ class Reference(LayeredImage):
             lines += [f"  {how.cached} of {batches} batches from the cache"] if how.cached else []
             files = "file" if how.damaged == 1 else "files"
             lines += [f"  {how.damaged} damaged {files} of the cache traced again"] if how.damaged else []
-            left_out = f"; {how.masked} pixels beside a light left out" if how.masked else ""
-            worst = f"{100 * how.errors['worst']:.3g} % of the worst pixel"
-            lines.append(f"  standard error {100 * how.errors['pooled']:.3g} % of the image, {worst}{left_out}")
+            lines.append(f"  standard error {_error_words(how)}")
         if batches < 32:
             known = 100 / (2 * (batches - 1)) ** 0.5
             lines.append(f"  a standard error from {batches} {kind} is known to {known:.0f} % only")
@@ -288,6 +286,14 @@ class Reference(LayeredImage):
     def title(self) -> str:
         """Title of the reference."""
         return f"{self.scene}, the reference by {self.estimator}"
+
+
+def _error_words(how: MonteCarloReference) -> str:
+    errors = how.errors
+    if errors.pooled is None or errors.worst is None:
+        return f"unknown: {errors.unknown}"
+    left_out = f"; {how.masked} pixels beside a light left out" if how.masked else ""
+    return f"{100 * errors.pooled:.3g} % of the image, {100 * errors.worst:.3g} % of the worst pixel{left_out}"
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

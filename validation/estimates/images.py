@@ -9,7 +9,8 @@ radiance, either of the image, *pooled*, or of its *worst* pixel:
 for each channel of each layer, the largest of which counts; pixels are independent of each other. The floor of a
 thousandth of the mean is that of `airlight compare`. Rays that pass a light within
 `validation.estimates.agreement.MASK_PIXELS` pixel widths are left out of the airlight's error: there no number of
-samples gives a standard error to trust (DESIGN section 6.6).
+samples gives a standard error to trust (DESIGN section 6.6). Where that leaves out all light of a layer, the error of
+the image is not known.
 
 The rule looks at the spread alone, never at a reference, so that stopping favours no verdict, and no run stops on a
 target before `LEAST_BATCHES`: the standard error of a standard error is 1/sqrt(2 (K - 1)) of it, 13 % at K = 32.
@@ -89,12 +90,21 @@ def _digest_of(loaded: LoadedScene) -> dict[str, str]:
 
 
 @dataclass(frozen=True)
+class RelativeErrors:
+    """The standard error of an image relative to its radiance [1], see the module."""
+
+    pooled: float | None  #: of all pixels together; None where it is not known
+    worst: float | None  #: of a single pixel
+    unknown: str | None = None  #: why they are not known
+
+
+@dataclass(frozen=True)
 class MonteCarloReference:
     """A reference by random samples, and how it came about."""
 
     image: Image = field(repr=False)  #: layers with their standard errors
-    errors: dict[str, float]
-    reached: bool | None  #: whether the target error was reached; None if none was set
+    errors: RelativeErrors
+    reached: bool | None  #: whether the target error is known to be reached; None if none was set
     masked: int  #: pixels beside a light, whose airlight is left out of `errors`
     cached: int  #: batches that were in the cache
     damaged: int  #: files of the cache that were damaged and have been replaced
@@ -144,7 +154,7 @@ def monte_carlo_reference(
         elsewhere=elsewhere,
     )
     errors = relative_errors(run.batches, near)
-    reached = None if budget.error is None else errors["pooled"] <= budget.error
+    reached = None if budget.error is None else errors.pooled is not None and errors.pooled <= budget.error
     image = _layered_batches(loaded, estimator, run.batches, distance=distance.reshape(shape))
     if seen is not None:
         transmittance = seen.transmittance.reshape(*shape, 3)
@@ -177,10 +187,15 @@ class _Watch:
         self._took, self._last, self._step = stopwatch(), 0.0, 0.0
 
     def enough(self, batches: Batches) -> bool:
-        """Say whether the target is reached; expect the error to fall with the square root of the batches."""
+        """Say whether to stop: at the target, or where the error is not known, which more batches do not change.
+
+        The error falls with the square root of the batches, which says how many are expected.
+        """
         assert self._budget.error is not None
-        error = relative_errors(batches, self._near)["pooled"]
+        error = relative_errors(batches, self._near).pooled
         done = len(batches.seeds)
+        if error is None:
+            return done >= LEAST_BATCHES
         self._expected = max(LEAST_BATCHES, math.ceil(done * min(1e6, error / self._budget.error) ** 2))
         self._words = f", pooled error {error:.3g} of {self._budget.error:.3g}"
         return done >= LEAST_BATCHES and error <= self._budget.error
@@ -239,26 +254,30 @@ def _power_of_two(number: int) -> int:
     return 1 << (max(1, number).bit_length() - 1)
 
 
-def relative_errors(batches: Batches, near: Bools) -> dict[str, float]:
-    """Return the relative standard errors [1] of some batches, less the airlight of pixels `near` a light, (pixels,).
+def relative_errors(batches: Batches, near: Bools) -> RelativeErrors:
+    """Return the relative standard errors of some batches, less the airlight of pixels `near` a light, (pixels,).
 
-    See the module: 'pooled' is that of the sum of all pixels' errors, the largest of all layers and channels, 'worst'
-    that of a single pixel; 0 in the dark, infinite for what is not finite.
+    The largest of all layers and channels counts; one that is dark has none. They are not known where a layer is lit
+    only in pixels that are left out, where no sample brought light, and where a number is not finite.
     """
-    pooled = worst = 0.0
+    pooled: list[float] = []
+    worst: list[float] = []
     for number, layer in enumerate(LAYERS):
+        mean, error = batches.mean[number], batches.standard_error[number]
+        if not (np.isfinite(mean).all() and np.isfinite(error).all()):
+            return RelativeErrors(None, None, f"the {layer} is not finite in all pixels")
         keep = ~near if layer == "airlight" else np.ones_like(near)
-        mean, error = batches.mean[number][keep], batches.standard_error[number][keep]
+        lit = mean.any(axis=0)
+        mean, error = mean[keep][:, lit], error[keep][:, lit]
         total = mean.sum(axis=0)
-        if not (np.isfinite(total).all() and np.isfinite(error).all()):
-            return {"pooled": np.inf, "worst": np.inf}  # no target is met by what is no number
-        lit = total > 0
-        if not lit.any():
-            continue
-        mean, error, total = mean[:, lit], error[:, lit], total[lit]
-        pooled = max(pooled, float((np.sqrt((error**2).sum(axis=0)) / total).max()))
-        worst = max(worst, float((error / np.maximum(mean, _FLOOR * total / len(mean))).max()))
-    return {"pooled": pooled, "worst": worst}
+        if not (total > 0).all():
+            return RelativeErrors(None, None, f"all pixels with {layer} lie beside a light, and are left out")
+        if lit.any():
+            pooled.append(float((np.sqrt((error**2).sum(axis=0)) / total).max()))
+            worst.append(float((error / np.maximum(mean, _FLOOR * total / len(mean))).max()))
+    if not pooled:
+        return RelativeErrors(None, None, "no sample brought light")
+    return RelativeErrors(max(pooled), max(worst))
 
 
 def near_light(reference: ReferenceScene, distance: Array) -> Bools:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import validation.estimates.images
 import validation.estimates.monte_carlo
 from reference.monte_carlo.batches import single_batch
 from reference.storage.cache import cache_folder, load_arrays
@@ -80,6 +81,17 @@ def test_target_error_is_reached_and_no_more(traced, tmp_path, capfd):
     again = summary(tmp_path / "b.exr", capfd, "--error", "0.02")
     assert again["how"]["cached"] == reached["batches"]
     assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+
+
+def test_an_error_that_is_not_known_is_said_so_in_text_and_json(traced, tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr(validation.estimates.images, "near_light", lambda reference, distance: distance > 0)
+    printed = summary(tmp_path / "a.exr", capfd, "--error", "0.02", status=1)
+    errors = printed["how"]["errors"]
+    assert (printed["relative_error"], errors["pooled"], errors["worst"]) == (None, None, None)
+    run(tmp_path / "b.exr", "--error", "0.02", status=1)
+    out = capfd.readouterr().out
+    assert f"standard error unknown: {errors['unknown']}" in out
+    assert "standard error 0" not in out
 
 
 def test_quadrature_needs_no_budget(variant, tmp_path, capfd):

@@ -261,11 +261,11 @@ def test_errors_by_hand():
     surface_error = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.5]]  # 0.5 of 5 and of 10
     traced = batches([airlight, surface], [airlight_error, surface_error])
     errors = relative_errors(traced, np.zeros(2, dtype=bool))
-    assert errors["pooled"] == pytest.approx(0.125, rel=1e-12)
-    assert errors["worst"] == pytest.approx(0.3, rel=1e-12)
+    assert errors.pooled == pytest.approx(0.125, rel=1e-12)
+    assert errors.worst == pytest.approx(0.3, rel=1e-12)
     # Without the first pixel of the airlight: 0.4/3 pooled and worst.
     errors = relative_errors(traced, np.array([True, False]))
-    assert (errors["pooled"], errors["worst"]) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
+    assert (errors.pooled, errors.worst) == pytest.approx((0.4 / 3, 0.4 / 3), rel=1e-12)
 
 
 @pytest.mark.claim("pixels-beside-a-light")
@@ -288,7 +288,22 @@ def test_no_target_is_met_by_what_is_no_number(odd, layer):
     mean[layer, 2] = odd
     batches = Batches(tuple(range(32)), 1, mean, np.zeros_like(mean), np.ones((32, 2, 3)))
     errors = relative_errors(batches, np.zeros(4, dtype=bool))
-    assert (errors["pooled"], errors["worst"]) == (np.inf, np.inf)
+    assert (errors.pooled, errors.worst) == (None, None)
+    assert errors.unknown is not None
+
+
+def test_an_error_of_no_pixel_is_not_zero():
+    """All airlight beside a light, lit or not the surface, or no light at all: nothing is known of the error."""
+    lit, dark = np.ones((4, 3)), np.zeros((4, 3))
+    some = np.array([True, True, False, False])
+    beside = lit * some[:, None]  # lit only where pixels are left out
+    cases = [(lit, dark, ~np.zeros(4, bool)), (lit, lit, ~np.zeros(4, bool)), (beside, lit, some), (dark, dark, ~some)]
+    for airlight, surface, near in cases:
+        errors = relative_errors(batches([airlight, surface], [0.1 * airlight, 0.1 * surface]), near)
+        assert (errors.pooled, errors.worst) == (None, None)
+    # A layer that is dark everywhere takes nothing from what is known of the other.
+    errors = relative_errors(batches([lit, dark], [0.1 * lit, dark]), some)
+    assert (errors.pooled, errors.worst) == pytest.approx((0.1 / np.sqrt(2), 0.1))
 
 
 @pytest.fixture
@@ -343,6 +358,13 @@ def test_progress_shows_the_error_falling_to_its_target(loaded):
 def test_no_run_stops_on_a_target_before_its_error_is_known(loaded):
     reference, _ = run(loaded, Budget(error=0.5))
     assert reference.image.attributes["airlight:batches"] == 32
+
+
+@pytest.mark.claim("targets-of-a-run")
+def test_a_run_whose_error_is_not_known_ends_and_reaches_nothing(loaded, monkeypatch):
+    monkeypatch.setattr(validation.estimates.images, "near_light", lambda reference, distance: np.ones(12, dtype=bool))
+    reference, _ = run(loaded, Budget(error=0.5))
+    assert (reference.image.attributes["airlight:batches"], reference.reached) == (32, False)
 
 
 @pytest.mark.claim("targets-of-a-run")
