@@ -52,7 +52,7 @@ def made_here(airlight: str, variant: str) -> Made:
 
 def row_source() -> str:
     """Return a digest of the source code that computes rows, the same wherever it is installed."""
-    return source_digest(run, cell_reference, scene_properties)
+    return source_digest(*(function.__module__ for function in (run, cell_reference, scene_properties)))
 
 
 @dataclass(frozen=True)
