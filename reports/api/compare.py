@@ -77,7 +77,8 @@ def compare(
     mask
         An EXR file that is 0 in pixels to leave out; from Python also truth values, (height, width).
     margin
-        Largest relative bias that counts as agreement, such as 0.005; two images need standard errors for it.
+        Largest relative bias that counts as agreement, such as 0.005; two images need standard errors for it, or the
+        bound that a reference states.
     all_metrics
         Also compute the errors of other tools, colour differences, and HDR-FLIP by flip-evaluator.
     diagnose
@@ -97,7 +98,7 @@ def compare(
     Raises
     ------
     InputError
-        If a layer is missing, sizes differ, a margin is given without standard errors, or options do not go together.
+        If a layer is missing, sizes differ, a margin is given without errors, or options do not go together.
 
     Examples
     --------

@@ -15,17 +15,31 @@ from numpy.typing import ArrayLike
 from analytic.errors import InputError
 from reference.storage.exr import NOTE, TOTAL, Image, layer_names, read_exr
 from reference.storage.exr import layer as image_layer
-from validation.arrays import Bools
+from validation.arrays import Array, Bools
 from validation.columns import columns_of, shown_values
 from validation.metrics.colour import ColourDifference, colour_difference
 from validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
 from validation.metrics.flip import Flip, flip_hdr
 from validation.metrics.other_tools import PublishedErrors, published_errors
-from validation.statistics.comparison import LEVEL, NoisyImage, compare_statistics
+from validation.statistics.comparison import LEVEL, NoisyImage, check_margin, compare_statistics
+from validation.statistics.estimate import Answer, Estimate, Kind
 from validation.statistics.records import Statistics
 
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
 BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
+_BOUND = "airlight:bound"  # header attribute: of what kind the error in the layer `<layer>_bound` is
+
+
+@dataclass(frozen=True)
+class StatedErrors:
+    """The errors without noise that two files state of their own pixels, and what they make of the relative bias."""
+
+    reference: Estimate | None  #: mean of its layer, and of the error of its pixels [W/(m^2 sr)]; None if not stated
+    test: Estimate | None  #: the same of the test image
+    bias_error: float | None  #: by how much both can change the relative bias [1]; None where it is not known
+    kind: Kind  #: proven if all stated errors are
+    margin: float | None = None  #: that these errors alone decide on; standard errors have it in `Statistics`
+    equivalent: bool | None = None  #: whether the relative bias is known to be within the margin
 
 
 @dataclass(frozen=True)
@@ -35,6 +49,7 @@ class Comparison:
     layer: str  #: the layer that was compared
     metrics: Metrics  #: of all pixels that the mask leaves
     statistics: Statistics | None  #: None where neither image has standard errors
+    stated: StatedErrors | None = None  #: None where neither file states an error of the layer
     masked: int = 0  #: pixels that the mask leaves out
     errors: PublishedErrors | None = None  #: as other tools print them
     errors_normalised: PublishedErrors | None = None  #: the same with the mean of the reference as the unit
@@ -57,6 +72,7 @@ class Comparison:
         ]
         if m.bias is not None and m.relative_bias is None:
             lines.append("  undefined      the mean of the reference is not above zero: nothing is relative to it")
+        lines += [] if self.stated is None else _stated_lines(self.stated)
         if self.statistics is not None:
             lines += statistics_lines(self.statistics)
         more: dict[str, Any] = {"other tools": self.errors, "over the mean": self.errors_normalised}
@@ -83,13 +99,15 @@ def compare_images(
     order of scattering that both have, such as `airlight_3_4`.
 
     Statistics need the standard errors in the layer `<layer>_se` of either image; with both, both count. The header
-    attribute `airlight:batches` says from how many batch means they come.
+    attribute `airlight:batches` says from how many batch means they come. An error that is no noise is in the layer
+    `<layer>_bound` of either image, and the attribute `airlight:bound` says whether it is proven or estimated.
 
     The mask says which pixels to compare, (height, width) of truth values; pixels of the frame that a file does not
-    hold are left out too. The `margin` is the largest relative bias that counts as agreement; it wants standard errors.
-    `all_metrics` adds the errors by the formulae of other tools, the colour differences and HDR-FLIP. Messages call the
-    images by their `names`.
+    hold are left out too. The `margin` is the largest relative bias that counts as agreement; it needs errors of either
+    kind, and counts all that there are. `all_metrics` adds the errors by the formulae of other tools, the colour
+    differences and HDR-FLIP. Messages call the images by their `names`.
     """
+    check_margin(margin)
     named = tuple(zip(names, (reference, test)))
     chosen = test.with_data(reference.with_data(None if mask is None else np.asarray(mask)))
     name = common_layer(*named) if layer is None else layer
@@ -111,25 +129,35 @@ def _compared(
     """Compare a layer of two images, each with its name."""
     expected, tested = (_estimate(path, image, layer) for path, image in named)
     metrics = error_metrics(expected.mean, tested.mean, mask=mask)
-    statistics = None
+    stated, statistics = _stated_errors(named, layer, mask), None
+    # The verdict on a margin counts noise and stated errors together.
     if expected.standard_error is not None or tested.standard_error is not None:
-        statistics = compare_statistics(expected, tested, mask=mask, margin=margin)
-    elif margin is not None:
+        bound = 0.0 if stated is None else math.inf if stated.bias_error is None else stated.bias_error
+        statistics = compare_statistics(expected, tested, mask=mask, margin=margin, bound=bound)
+        equivalent = statistics.equivalent
+    elif stated is not None and margin is not None:
+        bias = Estimate(metrics.relative_bias, stated.bias_error, stated.kind)
+        equivalent = bias.within(margin) is Answer.YES
+        stated = replace(stated, margin=margin, equivalent=equivalent)
+    elif margin is None:
+        equivalent = None
+    else:
         raise InputError(
-            f"a margin wants standard errors, and neither {named[0][0]} nor {named[1][0]} has a layer "
-            f"'{layer}_se'; leave the margin out, or make the reference by Monte Carlo"
+            f"a margin needs errors, and neither {named[0][0]} nor {named[1][0]} has a layer '{layer}_se' or "
+            f"'{layer}_bound'; leave the margin out, or make the reference by airlight reference"
         )
     images: tuple[ArrayLike, ArrayLike] = (expected.mean, tested.mean)
     ref, tst, chosen = compared(*images, mask)
     finite = (np.isfinite(ref) & np.isfinite(tst)).all(axis=2)
     failures = wrong_pixels(chosen & ~finite, "NaN or infinite")
     failures += wrong_pixels(chosen & (tst < 0).any(axis=2), "negative in the test image")
-    if statistics is not None and statistics.equivalent is False:
+    if equivalent is False:
         failures += (f"the relative bias is not shown to be within +-{margin:.3g}",)
     return Comparison(
         layer,
         metrics,
         statistics,
+        stated,
         failures=failures,
         masked=0 if mask is None else int((~np.asarray(mask)).sum()),
         errors=published_errors(*images, mask=mask) if all_metrics else None,
@@ -168,6 +196,59 @@ def _estimate(path: str, image: Image, name: str) -> NoisyImage:
             f"{path} has the attribute {BATCHES} {batches!r}; expected an integer; correct it or remove it"
         )
     return NoisyImage(image_layer(image, name, path), error, batches)
+
+
+def _stated_errors(named: Sequence[tuple[str, Image]], layer: str, mask: Any) -> StatedErrors | None:
+    """Return what two images, each with its name, say of their own errors in the pixels that are compared.
+
+    The true images are T +- t and R +- r in the mean: |T'/R' - T/R| is at most (t + r T/R) / (R - r). The rounding of a
+    file to single precision, up to half an epsilon of each pixel, is a part of t and r.
+    """
+    bounds = [image.layers.get(f"{layer}_bound") for _, image in named]
+    if all(bound is None for bound in bounds):
+        return None
+    layers = [np.asarray(image_layer(image, layer, path)) for path, image in named]
+    *images, chosen = compared(layers[0], layers[1], mask)
+    finite = chosen & np.isfinite(images).all(axis=(0, 3))
+    sides = [
+        None if bound is None else _stated(path, image, values[finite], np.asarray(bound, dtype=np.float64)[finite])
+        for (path, image), values, bound in zip(named, layers, bounds)
+    ]
+    # A file without a stated error is compared as it is; an error that is stated and no number is not known.
+    kinds = {side.kind for side in sides if side is not None}
+    kind: Kind = "proven" if kinds == {"proven"} else "estimated"
+    r, t = (0.0 if side is None else math.nan if side.error is None else side.error for side in sides)
+    reference, test = (float(values[finite].mean()) if finite.any() else math.nan for values in images)
+    known = math.isfinite(t) and r < reference
+    change = (t + r * abs(test / reference)) / (reference - r) if known else None
+    return StatedErrors(sides[0], sides[1], change, kind)
+
+
+def _stated(path: str, image: Image, values: Array, bound: Array) -> Estimate:
+    """Return the mean of the compared pixels of one image, and the mean of their errors by its file."""
+    kinds: dict[Any, Kind] = {"proven": "proven", "estimated": "estimated"}
+    said = image.attributes.get(_BOUND, "estimated")
+    if said not in kinds:
+        raise InputError(f"{path} has the attribute {_BOUND} {said!r}; expected {' or '.join(kinds)}; correct it")
+    if not (values.size and np.isfinite(bound).all() and (bound >= 0).all()):
+        return Estimate(float(values.mean()) if values.size else None, None, kinds[said])
+    rounding = float(np.finfo(np.result_type(values, np.float32)).eps) / 2
+    mean, size = (float(each.mean(dtype=np.float64)) for each in (values, np.abs(values)))
+    return Estimate(mean, float(bound.mean()) + rounding * size, kinds[said])
+
+
+def _stated_lines(stated: StatedErrors) -> list[str]:
+    sides = {"reference": stated.reference, "test image": stated.test}
+    words = [
+        f"mean of the {name} {each.words(unit=' W/(m^2 sr)')} ({each.kind})"
+        for name, each in sides.items()
+        if each is not None
+    ]
+    change = "unknown" if stated.bias_error is None else f"{percent(stated.bias_error)} at most"
+    lines = [f"stated errors    {'; '.join(words)}", f"  together       of the relative bias {change} ({stated.kind})"]
+    if stated.margin is None:
+        return lines
+    return [*lines, f"margin           +-{percent(stated.margin)}: {'inside' if stated.equivalent else 'NOT inside'}"]
 
 
 def statistics_lines(s: Statistics) -> list[str]:

@@ -115,6 +115,7 @@ def compare_statistics(
     *,
     mask: ArrayLike | None = None,
     margin: float | None = None,
+    bound: float = 0.0,
 ) -> Statistics:
     """Test two images against each other (derivations: see the module).
 
@@ -128,10 +129,10 @@ def compare_statistics(
     At least one of two independent estimates has a standard error. Pixels that the mask leaves out, (height, width) of
     truth values, or that are not finite in either mean are not compared: `error_metrics` counts the latter, and batch
     means, which would not be of these pixels, are then ignored. A relative bias up to the `margin` [1] counts as
-    agreement, such as 0.005.
+    agreement, such as 0.005. The relative bias may have an error of up to the `bound` [1] that is no noise: agreement
+    allows for it on both sides of each interval.
     """
-    if margin is not None and not 0 < margin < np.inf:
-        raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
+    check_margin(margin)
     ref, tst, asked = compared(reference.mean, test.mean, mask)
     if reference.standard_error is None and test.standard_error is None:
         raise InputError("neither image has a standard error; give one, or compare them by their metrics alone")
@@ -150,9 +151,17 @@ def compare_statistics(
         **_block_tests(expected, tested),
         **bias,
         "margin": margin,
-        "equivalent": None if margin is None else all(-margin < low and high < margin for low, high in intervals),
+        "equivalent": None
+        if margin is None
+        else all(bound - margin < low and high < margin - bound for low, high in intervals),
     }
     return record_of(found, Statistics)
+
+
+def check_margin(margin: float | None) -> None:
+    """Refuse a margin that nothing can lie in."""
+    if margin is not None and not 0 < margin < np.inf:
+        raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
 
 
 def _value_tests(expected: _Side, tested: _Side, chosen: Bools) -> dict[str, Any]:

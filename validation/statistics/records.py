@@ -44,7 +44,7 @@ class Statistics:
     largest_fraction: Number  #: of one pixel in that variance; above 1 % the interval is doubtful
     detectable_bias: Number = column("detectable", meaning="the least bias that is found in nine runs of ten")
     margin: Number = column(meaning="agreement: the whole interval lies inside it, either way")
-    equivalent: bool | None  #: whether all intervals lie within the margin
+    equivalent: bool | None  #: whether all intervals, and stated errors beside them, lie within the margin
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -157,7 +157,7 @@ SMALL = {"scene": "open-fog", "size": (8, 6)}
         ("render", SMALL | {"precision": "half"}, "precision"),
         ("reference", SMALL | {"pixel": "corner"}, "'centre' or 'area'"),
         ("compare", {"reference": ONES, "test": np.ones((2, 3, 3))}, "two sizes"),
-        ("compare", {"reference": ONES, "test": ONES, "margin": 0.1}, "a margin wants standard errors"),
+        ("compare", {"reference": ONES, "test": ONES, "margin": 0.1}, "a margin needs errors"),
         ("compare", {"reference": [["a"]], "test": ONES}, "the reference: got list"),
         ("compare", {"reference": ONES, "test": ONES, "mask": np.ones((2, 2))}, "expected truth values"),
     ],

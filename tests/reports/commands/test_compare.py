@@ -46,6 +46,23 @@ def test_the_margin_decides(files, capsys):
     assert run(["compare", *images]) == 0
 
 
+def test_text_and_json_name_the_errors_that_both_files_state(tmp_path, capsys):
+    paths = []
+    for name, kind, value in (("a", "proven", 2.0), ("b", "estimated", 2.02)):
+        layers = {"airlight": np.full(SHAPE, value), "airlight_bound": np.full(SHAPE, 0.02)}
+        paths.append(str(tmp_path / f"{name}.exr"))
+        write_exr(tmp_path / f"{name}.exr", Image(layers, attributes={"airlight:bound": kind}))
+    values = printed(capsys, *paths, "--margin", "0.05")["stated"]
+    assert run(["compare", *paths, "--margin", "0.05"]) == 0
+    text = capsys.readouterr().out
+    for side in (values["reference"], values["test"]):
+        assert f"{side['value']:.4g} +- {side['error']:.2g} W/(m^2 sr) ({side['kind']})" in text
+    assert f"{100 * values['bias_error']:.4g} % at most ({values['kind']})" in text
+    assert (values["margin"], values["equivalent"]) == (0.05, True)
+    assert "+-5 %: inside" in text
+    assert run(["compare", *paths, "--margin", "0.02"]) == 1
+
+
 @pytest.mark.claim("engine-margin", "scenes-stand-first")
 def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
     """The reference is found at the size of the file; upside down it is suspected, and the margin decides."""

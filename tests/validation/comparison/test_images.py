@@ -62,6 +62,55 @@ def test_failures_name_what_is_wrong(pair):
     assert "NOT inside" in comparison.summary()
 
 
+def bounded(values, bound, kind="proven", **layers):
+    return Image({"airlight": values, "airlight_bound": bound, **layers}, attributes={"airlight:bound": kind})
+
+
+def test_stated_errors_of_both_files_count_in_the_verdict_on_a_margin():
+    """By hand: a mean of 2 known to 0.02 and one of 2.02 known to 0.01; the bias of 1 % may be off by 0.01 + 0.0101."""
+    reference, test = (np.full(SHAPE, value) for value in (2.0, 2.02))
+    files = bounded(reference, np.full(SHAPE, 0.02)), bounded(test, np.full(SHAPE, 0.01), "estimated")
+    stated = compare_images(*files).stated
+    assert (stated.reference.kind, stated.test.kind, stated.kind) == ("proven", "estimated", "estimated")
+    assert (stated.reference.value, stated.reference.error) == pytest.approx((2.0, 0.02))
+    assert stated.bias_error == pytest.approx((0.01 + 0.02 * 1.01) / 1.98)
+    # The bias alone is within 2 %; with its error of 1.5 % it is within 2.6 % and not shown to be within 2.5 %.
+    assert compare_images(*files, margin=0.026).failures == ()
+    words = "the relative bias is not shown to be within +-0.025"
+    assert compare_images(*files, margin=0.025).failures == (words,)
+    # Beside noise of 0.1 % a pixel, 0.006 % of the image, the same bound counts on both sides of the interval.
+    noisy = bounded(test, np.full(SHAPE, 0.01), "estimated", airlight_se=0.001 * test)
+    assert compare_images(files[0], noisy, margin=0.027).failures == ()
+    assert compare_images(files[0], noisy, margin=0.025).failures == (words,)
+    assert (
+        compare_images(Image({"airlight": reference}), Image({"airlight": test, "airlight_se": 0.001 * test})).stated
+        is None
+    )
+
+
+@pytest.mark.parametrize("odd", [np.nan, np.inf, -1.0, 3.0])
+def test_a_bound_that_says_nothing_decides_nothing(odd):
+    """It is no number, negative, or larger than the reference."""
+    values = np.full(SHAPE, 2.0)
+    reference = bounded(values, np.full(SHAPE, odd))
+    for test in (Image({"airlight": values}), Image({"airlight": values, "airlight_se": 0.01 * values})):
+        compared = compare_images(reference, test, margin=0.5)
+        assert compared.stated.bias_error is None
+        assert len(compared.failures) == 1
+
+
+def test_a_file_is_known_to_no_more_than_its_rounding(tmp_path):
+    write_exr(tmp_path / "a.exr", bounded(np.full(SHAPE, 0.3), np.full(SHAPE, 1e-14)))
+    stated = compare_files(tmp_path / "a.exr", tmp_path / "a.exr").stated
+    assert abs(stated.reference.value - 0.3) <= stated.reference.error < 0.3 * 2**-23
+
+
+def test_a_kind_of_error_that_nobody_knows_is_refused():
+    values = np.ones(SHAPE)
+    with pytest.raises(InputError, match="airlight:bound 'certain'; expected proven or estimated"):
+        compare_images(bounded(values, values, "certain"), Image({"airlight": values}))
+
+
 def test_a_mask_from_a_file(pair, tmp_path):
     mask = np.zeros(SHAPE, dtype=np.float32)
     mask[3:5, :, 1] = 1
