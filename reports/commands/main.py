@@ -116,8 +116,6 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
             kind = inspect.Parameter.POSITIONAL_ONLY
         elif each.name in _SPELT:
             how["name"] = _SPELT[each.name]
-        elif default is True:
-            how["negative"] = f"--no-{each.name}"
         shown = each.replace(kind=kind, annotation=Annotated[annotation, Parameter(**how)], default=default)
         (named if kind is inspect.Parameter.KEYWORD_ONLY else positional).append(shown)
     extra: dict[str, Any] = {"output": _OUTPUT} if endings else {}

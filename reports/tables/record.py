@@ -9,6 +9,7 @@ import base64
 import os
 import shutil
 import sys
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -53,9 +54,9 @@ class Result:
     """The result of a function."""
 
     @property
+    @abstractmethod
     def title(self) -> str:
         """Title of the output."""
-        return ""
 
     @property
     def claims(self) -> Sequence[str]:
@@ -68,9 +69,9 @@ class Result:
         return ()
 
     @property
+    @abstractmethod
     def lines(self) -> Sequence[str]:
         """Sentences that stand below the tables."""
-        return ()
 
     @property
     def faults(self) -> Sequence[str]:

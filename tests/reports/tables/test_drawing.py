@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from reports.tables.drawing import csv, html, latex, markdown, text
-from reports.tables.table import Column, Measured, Row, Table, numbers, with_spread, words
+from reports.tables.table import Column, Measured, Name, Row, Table, numbers, table, with_spread, words
 
 
 @pytest.mark.claim("latex-tables")
@@ -59,3 +59,58 @@ def test_five_ways_carry_the_same_cells_and_escape_what_means_something_to_them(
     assert latex([drawn]).splitlines()[-4:-2] == [cells, refusal]
     wanted = "name,time,time_low,time_high,reason\n<b> a|b & c_d 50 %,12.345,12,13,\nb,,,,no <light>\n"
     assert csv(drawn).replace("\r", "") == wanted
+
+
+@pytest.mark.claim("tables-at-80-columns")
+@pytest.mark.parametrize(("styled", "name"), [(False, "planes"), (True, "\x1b[1mplanes\x1b[0m")])
+def test_sentences_in_a_narrow_terminal_are_a_list_that_leaves_nothing_out(styled, name):
+    columns = (
+        *words(name="name"),
+        *words(what="what it is for", source="source", how={"long": True}),
+        *numbers("cost"),
+    )
+    sentence = "It draws the silhouettes of occluders as seen from a light of the scene."
+    drawn = text(table("", columns, [("planes", sentence, "", 12.5)]), width=34, styled=styled)
+    assert drawn.splitlines() == [
+        "",
+        name,
+        "  what it is for: It draws the",
+        "    silhouettes of occluders as",
+        "    seen from a light of the",
+        "    scene.",
+        "  cost: 12.5",
+        "",
+    ]
+
+
+def test_names_that_one_types_are_code_with_the_address_of_their_page():
+    rows = [(Name("a|b_c", "methods.md#a"), 1.0), (Name("d"), 2.0)]
+    drawn = table("", (*words("name"), *numbers("cost")), rows)
+    assert markdown(drawn).splitlines()[2:] == ["| [`a\\|b_c`](methods.md#a) | 1 |", "| `d` | 2 |"]
+    assert '<a href="methods.md#a"><code>a|b_c</code></a>' in html(drawn)
+    assert latex([drawn]).splitlines()[5:7] == [r"\texttt{a|b\_c} & \num{1.00} \\", r"\texttt{d} & \num{2.00} \\"]
+    assert csv(drawn) == "name,cost\na|b_c,1\nd,2\n"
+
+
+@pytest.mark.claim("latex-tables")
+def test_tables_with_the_same_columns_are_one_tabular_with_a_line_of_units_where_there_are_some():
+    columns = (*words("name"), Column("time", "time", "ms"))
+    tables = [
+        table(title, columns, [(f"of {title}", value)], explanation="to 1e-3")
+        for title, value in (("hall", 1.5), ("fence", float("-inf")))
+    ]
+    lines = latex(tables, comment=["by hand"]).splitlines()
+    assert lines[1:6] == ["% by hand", r"\begin{tabular}{lr}", r"\toprule", r"name & time \\", r" & [ms] \\"]
+    assert lines[6:-2] == [
+        r"\midrule",
+        r"\multicolumn{2}{l}{\textit{hall}, to \num{1e-3}} \\",
+        r"of hall & \num{1.50} \\",
+        r"\addlinespace",
+        r"\multicolumn{2}{l}{\textit{fence}, to \num{1e-3}} \\",
+        r"of fence & $-\infty$ \\",
+    ]
+
+
+def test_a_value_without_a_column_is_refused():
+    with pytest.raises(ValueError, match="table 'times': no column for frme"):
+        Table("times", numbers("frame"), (Row({"frme": 1.0}),))

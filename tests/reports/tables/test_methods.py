@@ -7,10 +7,11 @@ from dataclasses import replace
 import pytest
 
 from reports.data.records import Method, Scene
-from reports.tables.agreement import verdict
+from reports.tables.agreement import trust_table, verdict
 from reports.tables.costs import cliffs, scaling_tables
 from reports.tables.drawing import csv, html, latex, markdown, text
 from reports.tables.methods import COLUMNS, TIMES, fastest_table, method_row, methods_table, times_words
+from reports.tables.table import Verdict
 from tests.helpers.reports import RUN, agreement, errors, growth_record, record_of, scene
 from tests.helpers.reports import entry as made
 from validation.statistics.records import Agreement
@@ -76,6 +77,8 @@ def test_a_table_says_of_which_runs_its_times_are():
         "Times of b: measured in turns in one run of 5 rounds, 2026-11-22 07:00:00 +0000; the machine CHANGED" in mixed
     )
     assert mixed.endswith("is of another run, on another machine or by other rules.")
+    unknown = entry("d", times={"frame": timing(3.0), "run": RUN | {"steady": None}})
+    assert times_words([unknown]) == f"Times: measured in turns in one run of 5 rounds, {RUN['started']}."
     assert method_row(engine).remarks[-1] == "timed elsewhere"
     assert "timed elsewhere" not in method_row(ours).remarks
 
@@ -117,6 +120,18 @@ def test_what_has_no_finite_error_or_no_time_is_never_the_fastest(never):
 def test_a_reference_is_confirmed_refused_or_not_decided(equivalent, interval, finished, good):
     compared = agreement(equivalent, margin=0.005, finished=finished, relative_bias_ci=interval)
     assert verdict(record_of(compared, Agreement)) is good
+
+
+def test_an_estimator_that_did_not_check_a_scene_has_no_cells_there():
+    checks = {"volpath airlight": agreement(), "volpath surface": agreement(layer="surface", detectable=0.01)}
+    alone = {"single-scatter airlight": agreement(estimator="single-scatter", margin=0.05)}
+    both, one = (record_of(scene("b", [], agreement=each), Scene) for each in (checks | alone, checks))
+    rows = [row.values for row in trust_table([both, one]).rows]
+    assert rows[0]["single-scatter agrees"] == Verdict(True, "±5 %")
+    assert "single-scatter" not in rows[1]
+    assert rows[1]["volpath agrees"] == Verdict(True, "±1 %")
+    line = markdown(trust_table([both, one])).splitlines()[5]
+    assert line.endswith("| 0..+0.1 % | yes, ±1 % | - | - |")
 
 
 def test_jumps_are_found():

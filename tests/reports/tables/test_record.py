@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A result shows the same on a terminal, in a notebook and as JSON; no JSON has a number that is not finite."""
+
+import json
+
+import pytest
+
+from analytic.errors import InputError
+from reports.tables.record import Said, picture, print_json
+from reports.tables.table import numbers, table
+
+
+def test_a_result_has_its_claims_tables_and_lines_wherever_it_is_shown():
+    shown = Said(
+        name="a <scene>",
+        claims=["`exact` is 1 % off."],
+        tables=[table("Times", numbers("frame"), [(1.5,)])],
+        lines=["wrote `a.exr`"],
+    )
+    lines = [line.strip() for line in shown.text().splitlines()]
+    assert lines[:2] == ["- exact is 1 % off.", "Times"]
+    assert lines[-4:] == ["1.5", "", "", "wrote `a.exr`"]
+    notebook = shown._repr_html_()
+    assert "<strong>a &lt;scene&gt;</strong>" in notebook
+    assert "<li><code>exact</code> is 1 % off.</li>" in notebook
+    assert ">1.5</th>" in notebook
+    assert "<li>wrote <code>a.exr</code></li>" in notebook
+    assert repr(shown) == "Said(a <scene>)"
+
+
+@pytest.mark.claim("exit-status")
+@pytest.mark.parametrize(("good", "faults", "status"), [(True, (), 0), (False, (), 1), (True, ("no light",), 1)])
+def test_the_status_is_one_where_a_check_failed_or_something_is_at_fault(good, faults, status):
+    said = Said(name="s", good=good, faults=faults)
+    assert (said.passed, said.status) == (status == 0, status)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), [{"mean": float("-inf")}]])
+def test_a_number_that_is_not_finite_is_refused_rather_than_printed_as_no_json(value, capsys):
+    with pytest.raises(InputError, match="a result is not finite, and is not printed"):
+        print_json({"value": value})
+    assert capsys.readouterr().out == ""
+    print_json({"value": None, "name": "\N{GREEK SMALL LETTER SIGMA}"})
+    assert json.loads(capsys.readouterr().out) == {"value": None, "name": "\N{GREEK SMALL LETTER SIGMA}"}
+
+
+@pytest.mark.parametrize(("width", "shown"), [(6, 240), (100, 300), (240, 240), (320, 320)])
+def test_single_pixels_of_a_small_picture_can_be_seen(width, shown):
+    figure = picture(b"\x89PNG", width, alt="a <b>", caption="c & d")
+    assert f"width:{shown}px" in figure
+    assert ("image-rendering:pixelated" in figure) is (width < 240)
+    assert 'src="data:image/png;base64,iVBORw=="' in figure
+    assert 'alt="a &lt;b&gt;"' in figure
+    assert "<figcaption>c &amp; d</figcaption>" in figure
