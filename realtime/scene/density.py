@@ -9,14 +9,14 @@ linear between the centres of voxels (at (i + 1/2)/n of the grid's box, as Mitsu
 outermost ones. `Clouds.sigma_t` is scale rho_max, the largest extinction: a bound for code that knows extinctions
 alone. `Clouds.density` holds rho.
 
-Mitsuba tells Python a volume's values, its box and, in words of six digits, its transform. The transform is read from
-these words, except that its translation takes the middle of the box to the middle of the grid; it is right to 1e-6 of
-the grid. The densities are then compared with Mitsuba's own at some points, so nothing else can be taken for a grid
-that is linear between voxels.
+Mitsuba tells Python a volume's values and its box, and not its transform. The transform is measured: the middle of the
+box is that of the grid, and a grid of two voxels a side, 0 at one end of an axis and 1 at the other, has the coordinate
+along this axis as its value. Such a grid takes the place of the volume's own for each axis in turn, while it is read at
+places around the middle. The densities are then compared with Mitsuba's own at some points, so nothing else can be
+taken for a grid that is linear between voxels.
 """
 
 import math
-import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,7 +34,8 @@ Array = NDArray[np.float64]
 
 _POINTS = 512  # at which a grid is compared with Mitsuba's
 _DIFFERENCE = 2e-3  # from it, of the largest value: a grid read well differs by rounding, 1e-4 where voxels are noise
-_TURNED = 1e-5  # of the grid, by which float32 leaves its sides beside the axes
+_TURNED = 1e-5  # of the grid, by which float32 leaves its sides beside the axes; more far from the origin
+_HALVINGS = 20  # of steps from the middle of a grid: sides of one to a million
 _BEYOND = 1e-4  # how far a hull may reach beyond its grid, as a fraction of that
 
 
@@ -155,7 +156,7 @@ def read_density(medium: Any, name: str) -> DensityGrid:
     if not largest * scale > 0:
         raise InputError(f"{name} is empty: its grid is 0 everywhere; expected densities above 0 somewhere")
     values /= np.float32(largest)
-    grid = DensityGrid(values, largest * scale, _transform(medium))
+    grid = DensityGrid(values, largest * scale, _transform(medium, name))
     _compare(name, medium, grid)
     return grid
 
@@ -181,34 +182,58 @@ def along_the_axes(grid: DensityGrid, name: str) -> DensityGrid:
     return replace(grid, values=values.transpose(2 - order[::-1]), to_grid=to_grid)
 
 
-def _transform(medium: Any) -> Array:
-    """Return the transform of the volume of a medium, (3, 4)."""
-    words = str(medium).partition("sigma_t =")[2]
-    rows = re.search(r"matrix=\[(.*?)\]\]", words, re.S)
-    box = re.search(r"min = \[(.*?)\],\s*max = \[(.*?)\]", words, re.S)
-    if rows is None or box is None:
-        raise InputError(f"Mitsuba says nothing of the grid of the {medium.class_name()}; expected a 'gridvolume'")
-    matrix = np.array([float(number) for number in re.findall(r"[-+\w.]+", rows[1])]).reshape(4, 4)[:3, :3]
-    middle, size = _box(medium, box)
-    along = np.abs(matrix) > _TURNED * np.abs(matrix).max(axis=1, keepdims=True)
-    if along.sum() == 3:  # Along the axes the sides of the box have all digits, the words have six.
+def _transform(medium: Any, name: str) -> Array:
+    """Return the transform of the grid of a medium, (3, 4); messages call the medium by `name`."""
+    parameters = mi.traverse(medium)
+    volume = next(part for part in parameters.hierarchy if part.class_name() == "GridVolume")
+    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (volume.bbox().min, volume.bbox().max))
+    middle, size = 0.5 * (low + high), high - low
+    own = mi.TensorXf(parameters["sigma_t.data"])  # a copy: `parameters` writes into what it has returned
+    try:
+        matrix = _measured(parameters, volume, middle, size)
+    finally:
+        parameters["sigma_t.data"] = own
+        parameters.update()
+    if matrix is None:
+        raise InputError(
+            f"{name} has a grid that is not linear between voxels; expected a 'gridvolume' with the filter_type "
+            "'trilinear'"
+        )
+    # Mitsuba rounds a coordinate of the grid by so much, as it adds up products with places in float32.
+    rounding = float(np.finfo(np.float32).eps) * np.abs(matrix) @ (np.abs(middle) + size)
+    along = np.abs(matrix) * size > np.maximum(_TURNED, 4 * rounding)[:, None]
+    if along.sum() == 3:  # Along the axes the sides of the box have all digits.
         matrix = np.where(along, np.sign(matrix) / size, 0.0)
     return np.column_stack([matrix, 0.5 - matrix @ middle])
 
 
-def _box(medium: Any, words: re.Match) -> tuple[Array, Array]:
-    """Return the middle and the sides of the box of a medium [m]: by Mitsuba's rays, to all digits."""
-    low, high = (np.array([float(number) for number in part.split(",")]) for part in words.groups())
-    rough, size = 0.5 * (low + high), high - low
-    middle = rough.copy()
-    for axis in range(3):
-        way = np.eye(3)[axis]
-        start = mi.Point3f(*(float(c) for c in rough - way * (rough[axis] - low[axis] + size[axis])))
-        meets, near, far = medium.intersect_aabb(mi.Ray3f(start, mi.Vector3f(*(float(c) for c in way))))
-        if meets[0]:
-            middle[axis] = float(start[axis][0]) + 0.5 * (float(near[0]) + float(far[0]))
-            size[axis] = float(far[0]) - float(near[0])
-    return middle, size
+def _measured(parameters: Any, volume: Any, middle: Array, size: Array) -> Array | None:
+    """Return the derivatives of the coordinates of a grid by place, (3, 3) [1/m]; its values are lost.
+
+    None for a grid that is not linear between voxels.
+    """
+    steps = 0.2 * size  # along the axes of coordinates; the values are linear for 0.25 of the grid from its middle
+    for _ in range(_HALVINGS):
+        offsets = np.concatenate([np.diag(steps), -np.diag(steps)])
+        values = np.empty((3, 6))  # by axis of the grid, and by place
+        for axis in range(3):
+            ends = np.indices((2, 2, 2), dtype=np.float32)[2 - axis]
+            parameters["sigma_t.data"] = mi.TensorXf(ends[..., None])
+            parameters.update()
+            values[axis] = _values(volume, middle + offsets)
+        linear = ((values > 0) & (values < 1)).all(axis=0).reshape(2, 3).all(axis=0)
+        if linear.all():
+            # From end to end a value goes from 0 to 1 in half of the grid.
+            return (values[:, :3] - values[:, 3:]) / 2 / (2 * steps)
+        steps = np.where(linear, steps, steps / 2)
+    return None
+
+
+def _values(volume: Any, places: Array) -> Array:
+    """Return the values of a volume of one channel at places [m], (n, 3)."""
+    interaction = dr.zeros(mi.Interaction3f, len(places))
+    interaction.p = mi.Point3f(places.T)
+    return np.array(volume.eval_1(interaction), dtype=np.float64)
 
 
 def _compare(name: str, medium: Any, grid: DensityGrid) -> None:

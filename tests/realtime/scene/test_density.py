@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: grids of densities and closed meshes of clouds are read as they are; what is none is refused in one line."""
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from realtime.memory import Memory
 from realtime.methods.registry import FOG_METHODS, METHODS
 from realtime.numerics.array_types import array_types
 from realtime.scene.closed_mesh import closed_mesh, encloses
-from realtime.scene.density import DensityGrid, density_at, density_on_device
+from realtime.scene.density import DensityGrid, density_at, density_on_device, read_density
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, cloud_of, cloud_scene, dense, linear_between, loaded, ring
 from validation.scenes.meshes import box, joined, placed, torus
@@ -44,7 +45,7 @@ def test_a_grid_is_linear_between_its_voxels(precision):
 
 
 def test_a_turned_grid_far_away():
-    """The transform comes from words of six digits and a box: right to a fraction of the grid, wherever that is."""
+    """The transform is measured: right to a fraction of the grid, wherever that is."""
     middle = np.array([71_903.0, -51_307.0, 31_711.0])
     turn = (
         mi.ScalarTransform4f()
@@ -65,6 +66,26 @@ def test_a_turned_grid_far_away():
     found = np.array(density.at(mi.Vector3d(points.T), mi.UInt32(0)))
     # Mitsuba's box in float32 is right to 0.004 m of 50 m wide voxels here.
     np.testing.assert_allclose(found, linear_between(ROUGH, np.zeros(3), np.ones(3), fraction) / ROUGH.max(), atol=5e-4)
+
+
+def test_the_transform_of_a_turned_grid_is_measured_and_its_grid_left_as_it_was():
+    """Six digits of a word were right to 2.6e-6 of this grid."""
+    turn = mi.ScalarTransform4f().rotate([2 / 7, 6 / 7, -3 / 7], 37.0).scale([2.07, 0.471, -1.93])
+    to_world = turn @ mi.ScalarTransform4f().translate([-0.5, -0.5, -0.5])
+    loose = dense(ROUGH, LOW, HIGH)
+    medium = mi.load_dict(loose | {"sigma_t": loose["sigma_t"] | {"to_world": to_world}})
+
+    def contents():
+        majorant = medium.get_majorant(dr.zeros(mi.MediumInteraction3f))
+        return [*np.array(mi.traverse(medium)["sigma_t.data"]).ravel(), *np.array(majorant).ravel()]
+
+    before = contents()
+    grid = read_density(medium, "the grid")
+    corners = np.indices((2, 2, 2)).reshape(3, -1)
+    matrix = np.array(to_world.matrix, dtype=np.float64).reshape(4, 4)
+    places = matrix[:3, :3] @ corners + matrix[:3, 3:]
+    np.testing.assert_allclose(grid.to_grid[:, :3] @ places + grid.to_grid[:, 3:], corners, atol=1e-6)
+    assert contents() == before
 
 
 @pytest.mark.parametrize(("side", "words"), [(1024, "1073741824 voxels in all; expected fewer"), (300, "GB of memory")])
