@@ -144,15 +144,15 @@ def compare(
     if scene is None:
         return _two_images(reference, test, layer, files=files, **options)
     how = {"layer": layer, "holds": holds, "pixel": pixel}
-    with _as_file(test) as path:
+    with _as_file(test) as (path, name):
         from reference.storage.exr import read_exr
         from reports.machine.environment import activate
 
         read_exr(path)  # unreadable files are refused before Mitsuba starts
         activate()
         if diagnose:
-            return _diagnose(str(scene), path, progress=progress, **how)
-        return _with_scene(str(scene), path, files=files, progress=progress, **how, **options)
+            return _diagnose(str(scene), path, name, progress=progress, **how)
+        return _with_scene(str(scene), path, name, files=files, progress=progress, **how, **options)
 
 
 def _are_several(test: Any) -> bool:
@@ -190,18 +190,22 @@ def _is_xml(word: Any) -> bool:
 
 
 @contextmanager
-def _as_file(image: Any) -> Iterator[Path]:
-    """Give the path of an image, which is written to a file for this if it is none."""
+def _as_file(image: Any) -> Iterator[tuple[Path, str]]:
+    """Give the path of an image, which is written to a file for this if it is none, and what to call it."""
     if isinstance(image, str | os.PathLike):
-        yield Path(image)
+        yield Path(image), str(image)
         return
     from reference.storage.exr import write_exr
     from reference.storage.files import temporary_folder
 
-    layers, _ = as_image(image, "airlight", "the test image")
+    layers, name = as_image(image, "airlight", "the test image")
     with temporary_folder() as folder:
-        write_exr(folder / "image.exr", layers, finite=False)
-        yield folder / "image.exr"
+        path = folder / "image.exr"
+        write_exr(path, layers, finite=False)
+        try:
+            yield path, name
+        except InputError as error:  # nobody knows this file
+            raise InputError(str(error).replace(str(path), name)) from error
 
 
 def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
@@ -259,7 +263,7 @@ def _two_images(
 
 
 def _with_scene(
-    scene: str, path: Path, *, mask: Any, files: list[Path], progress: Any, **options: Any
+    scene: str, path: Path, name: str, *, mask: Any, files: list[Path], progress: Any, **options: Any
 ) -> "SceneComparison":
     from reports.api.comparisons import scene_comparison, write_difference
     from validation.engine.judge import compare_scene
@@ -267,18 +271,20 @@ def _with_scene(
     if mask is not None and not isinstance(mask, str | os.PathLike):
         raise InputError("mask: an image is compared with a scene under a mask that is an EXR file; save it first")
     with telling(progress, "the reference") as tell:
-        compared = compare_scene(scene, path, mask=mask, progress=tell, **options)
+        found = compare_scene(scene, path, mask=mask, progress=tell, **options)
+    compared = dataclasses.replace(found, path=name)
     images = compared.reference, compared.image
     said = tuple((str(file), write_difference(file, *images, kept=_mask(mask))) for file in files)
     return scene_comparison(compared, said)
 
 
-def _diagnose(scene: str, path: Path, *, progress: Any, **how: Any) -> "Said":
+def _diagnose(scene: str, path: Path, name: str, *, progress: Any, **how: Any) -> "Said":
     from reports.api.comparisons import diagnosed
     from validation.engine.diagnose import diagnose_file
 
     with telling(progress, "diagnosis") as tell:
-        return diagnosed(diagnose_file(path, scene, progress=tell, **how))
+        found = diagnose_file(path, scene, progress=tell, **how)
+    return diagnosed([dataclasses.replace(each, path=name) for each in found])
 
 
 def _fit(

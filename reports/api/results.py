@@ -147,11 +147,6 @@ class LayeredImage(Pictured):
         write_image(Path(path), self.image, total=self.total)
         return Path(path)
 
-    @property
-    def title(self) -> str:
-        """Title of the image."""
-        return self.scene
-
     def _repr_html_(self) -> str:
         from reports.tables.record import block, bullets, picture
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results of the Python API: frozen, arrays for NumPy, HTML and PNG for a notebook; from made-up numbers, no scene."""
 
+import base64
 import dataclasses
+import io
+import re
 
 import numpy as np
 import pytest
@@ -10,8 +13,10 @@ from PIL import Image as Picture
 from analytic.errors import InputError
 from reference.storage.exr import Image, read_exr
 from reports.api.compare import compare
-from reports.api.results import Reference, Rendering, sealed
+from reports.api.results import Reference, RenderedFrames, Rendering, sealed, write_image
+from reports.plotting.pictures import tone_curve
 from reports.studies.methods import MethodsStudy
+from validation.estimates.images import MonteCarloReference, RelativeErrors
 from validation.study.row import Row
 
 
@@ -56,6 +61,158 @@ def test_a_quadrature_of_an_area_light_says_where_its_standard_errors_come_from(
     shown = show(Reference(scene="panel", image=sealed(image), estimator="quadrature", relative_error=3e-3))
     assert "standard errors from 8 independent sets of light samples" in shown
     assert "seeds" not in shown
+
+
+def traced(*, batches=64, reached=None, masked=0, cached=0, damaged=0, errors=None):
+    """A reference by samples, as its run ended."""
+    image = layered(dtype=np.float64, airlight_se=np.full((4, 6, 3), 1e-3), surface_se=np.full((4, 6, 3), 2e-3))
+    image.attributes.update({"airlight:batches": batches, "airlight:spp": 2 * batches, "airlight:seeds": "3-66"})
+    errors = errors or RelativeErrors(0.0123, 0.456)
+    how = MonteCarloReference(image, errors, reached, masked, cached, damaged)
+    return Reference(scene="fog", image=sealed(image), estimator="volpath", relative_error=0.0123, how=how)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "  standard error 1.23 % of the image, 45.6 % of the worst pixel"),
+        (
+            {"masked": 7},
+            "  standard error 1.23 % of the image, 45.6 % of the worst pixel; 7 pixels beside a light left",
+        ),
+        ({"cached": 40}, "  40 of 64 batches from the cache"),
+        ({"damaged": 1}, "  1 damaged file of the cache traced again"),
+        ({"damaged": 2}, "  2 damaged files of the cache traced again"),
+        ({"batches": 9}, "  a standard error from 9 batches is known to 25 % only"),
+        ({"errors": RelativeErrors(None, None, "all pixels are beside a light")}, "unknown: all pixels are beside"),
+        ({"reached": False}, "  the target error was not reached"),
+    ],
+)
+def test_a_reference_by_samples_says_how_well_it_is_known_and_how_it_came_about(changes, words):
+    text = traced(**changes).text()
+    assert words in text
+    assert (words in traced().text()) is (changes == {})
+    assert (
+        f"{2 * changes.get('batches', 64)} samples a pixel in {changes.get('batches', 64)} batches, seeds 3-66" in text
+    )
+
+
+@pytest.mark.claim("exit-status", "targets-of-a-run")
+@pytest.mark.parametrize(("reached", "status"), [(None, 0), (True, 0), (False, 1)])
+def test_a_run_fails_where_the_error_that_was_asked_for_was_not_reached(reached, status):
+    assert traced(reached=reached).status == status
+
+
+def test_a_reference_by_samples_has_its_standard_errors_and_no_bound():
+    run = traced()
+    assert run.bound is None
+    assert (float(run.standard_error[0, 0, 0]), float(run.surface_standard_error[0, 0, 0])) == (1e-3, 2e-3)
+    assert reference(airlight_bound=np.full((4, 6, 3), 1e-9)).bound.shape == (4, 6, 3)
+
+
+def test_an_animation_says_what_a_frame_costs_and_which_files_there_are():
+    frames = RenderedFrames(
+        scene="hall",
+        method="ray-march",
+        moves=("light", "medium"),
+        size=(16, 12),
+        frames=2,
+        move_ms=1.5,
+        render_ms=18.5,
+        frame_ms=20.0,
+        recordings={},
+        device="llvm_ad_rgb",
+        files=("a-0001.exr", "a-0002.exr", "a-0001.png", "a-0002.png", "a.json"),
+    )
+    assert frames.text().splitlines() == [
+        "hall, ray-march: 2 frames, light and medium moving",
+        "  20 ms a frame (50 frames/s): 1.5 ms to move, 18.5 ms to render, reusing what stood still; llvm_ad_rgb",
+        "wrote a-0001.exr to a-0002.exr: 2 files, 16 x 12 pixels",
+        "wrote a-0001.png to a-0002.png: 2 files, 16 x 12 pixels",
+        "wrote a.json: what changes",
+    ]
+
+
+# In a notebook --------------------------------------------------------------------------------------------------------
+
+
+def pixels(png):
+    with Picture.open(io.BytesIO(png)) as shown:
+        return np.asarray(shown.convert("RGB")).astype(int)
+
+
+def figures(html):
+    """The pictures of a result in a notebook, by their captions."""
+    found = re.findall(r'base64,([^"]+)".*?<figcaption>(.*?)</figcaption>', html)
+    return {caption: pixels(base64.b64decode(data)) for data, caption in found}
+
+
+def test_a_notebook_shows_all_light_and_the_airlight_where_that_is_another_picture():
+    frame = rendering()
+    shown = figures(frame._repr_html_())
+    assert list(shown) == ["all light", "airlight"]
+    np.testing.assert_array_equal(shown["all light"], pixels(frame._repr_png_()))
+    np.testing.assert_array_equal(shown["airlight"], frame.picture("airlight"))
+    assert (shown["airlight"] < shown["all light"]).all()  # in the exposure of the total
+    assert "nothing written" not in frame._repr_html_()  # the command's words
+    assert "&lt;made &amp; up&gt; by slow (steps=3)" in frame._repr_html_()
+    fog = dataclasses.replace(frame, image=sealed(layered(surface=np.zeros((4, 6, 3), np.float32))))
+    assert list(figures(fog._repr_html_())) == ["all light"]
+
+
+def test_a_comparison_in_a_notebook_has_both_images_in_one_exposure_and_where_they_differ():
+    exact = reference()
+    dark = np.array(exact.airlight)
+    dark[2, 3] *= 0.8
+    compared = compare(exact, dark)
+    shown = figures(compared._repr_html_())
+    first, second, scale = shown
+    assert (first, second) == ("&lt;made &amp; up&gt;, the reference by quadrature", "the test image")
+    assert "blue too dark, red too bright" in scale
+    same = np.ones((4, 6), bool)
+    same[2, 3] = False
+    np.testing.assert_array_equal(shown[first][same], shown[second][same])
+    assert (shown[first][2, 3] > shown[second][2, 3]).all()
+    assert (shown[scale][same] >= 247).all()  # white: no error
+    red, _, blue = shown[scale][2, 3]
+    assert blue > red
+    np.testing.assert_array_equal(shown[scale], compared.picture())
+
+
+def test_a_comparison_is_an_array_of_relative_errors_and_one_line():
+    exact = reference()
+    compared = compare(exact, 1.01 * exact.airlight)
+    np.testing.assert_allclose(np.asarray(compared), 0.01, rtol=1e-9)
+    assert repr(compared) == (
+        "ImageComparison(airlight of the test image against <made & up>, the reference by quadrature: "
+        f"relative RMSE {compared.metrics.relative_rmse:.3g}, relative bias 0.01, passed)"
+    )
+    assert "relative 1 %" in compared.text()
+    negative = compare(exact, -exact.airlight)
+    assert (negative.passed, negative.status) == (False, 1)
+    assert "failed: " in repr(negative)
+    assert "negative" in repr(negative)
+    grey = compare(exact.airlight[..., 0], 1.01 * exact.airlight[..., 0])
+    assert grey.picture().shape == (4, 6, 3)
+    assert grey.error.shape == (4, 6)
+
+
+def test_a_layer_is_found_by_its_name_and_one_that_lacks_is_refused():
+    several = reference(airlight_3_4=np.full((4, 6, 3), 0.5))
+    assert several.layer("airlight_3_4").mean() == 0.5
+    with pytest.raises(InputError, match="'opacity'"):
+        several.layer("opacity")
+
+
+def test_frames_of_an_animation_share_the_curve_of_the_first(tmp_path):
+    bright, dim = layered(dtype=np.float64), layered(0.25, dtype=np.float64)
+    curve = tone_curve(bright.layers["airlight"] + bright.layers["surface"])
+    for name, image in (("bright", bright), ("dim", dim)):
+        write_image(tmp_path / f"{name}.png", image, curve)
+    write_image(tmp_path / "alone.png", dim)
+    shown = {path.stem: pixels(path.read_bytes()) for path in tmp_path.iterdir()}
+    assert (shown["dim"] <= shown["bright"]).all()
+    assert shown["dim"].mean() < shown["alone"].mean()
 
 
 @pytest.mark.claim("results-are-frozen")

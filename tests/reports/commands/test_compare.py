@@ -83,6 +83,38 @@ def test_a_scene_stands_in_place_of_the_reference(variant, tmp_path, capsys):
     assert "open-fog is 800 x 600, 1.333 to 1" in capsys.readouterr().err
 
 
+def test_from_python_a_result_or_an_array_is_judged_against_a_scene(variant):
+    exact = reference_image(load_scene("open-fog", (32, 24)).scene).airlight
+    compared = airlight.compare("open-fog", 1.01 * exact, pixel="centre", margin=0.005)
+    assert compared.metrics.relative_bias == pytest.approx(0.01, rel=1e-4)
+    assert compared.metrics == compared.of.comparison.metrics
+    assert compared.status == 1
+    assert compared.title == "airlight of the test image against open-fog"  # and no file that is gone
+    with pytest.raises(airlight.InputError, match=r"^the test image: 0 pixels"):
+        airlight.compare("open-fog", np.full((24, 32, 3), np.nan), diagnose=True)
+    with pytest.raises(airlight.InputError, match="under a mask that is an EXR file; save it first"):
+        airlight.compare("open-fog", exact, mask=np.ones((24, 32), bool))
+
+
+@pytest.mark.claim("diagnosis-right")
+def test_a_diagnosis_is_of_each_layer_and_its_text_has_the_words_of_its_data(variant, tmp_path, capsys):
+    """Both layers as they should be: no fault is looked for, which would take seconds."""
+    path = str(airlight.reference("sphere-spot", size=(32, 24)).save(tmp_path / "spot.exr"))
+    asked = ["sphere-spot", path, "--diagnose", "--pixel", "centre"]
+    data = printed(capsys, *asked)
+    assert [(each["layer"], each["first"]) for each in data["layers"]] == [("airlight", "right"), ("surface", "right")]
+    assert data["diagnosis"] == data["layers"][0]
+    assert run(["compare", *asked]) == 0
+    first, said, blank, second, also = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"{path}, airlight, against sphere-spot")
+    assert second.startswith(f"{path}, surface, against sphere-spot")
+    assert blank == ""
+    for line, each in ((said, data["layers"][0]), (also, data["layers"][1])):
+        assert line == f"Nothing is wrong with it: {each['verdict']}."
+    again = airlight.compare("sphere-spot", airlight.reference("sphere-spot", size=(32, 24)), diagnose=True)
+    assert [each.path for each in again.of] == ["sphere-spot, the reference by quadrature"] * 2
+
+
 @pytest.mark.claim("difference-image")
 def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, capsys):
     from PIL import Image as Picture

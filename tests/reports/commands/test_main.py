@@ -86,7 +86,7 @@ def test_a_path_may_begin_at_home(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     for words in (["-o", "~/one.glsl"], ["--output=~/two.glsl"]):
         assert cli.run(["export", *words]) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.glsl", "two.glsl"]
+    assert sorted(path.name for path in tmp_path.glob("*.glsl")) == ["one.glsl", "two.glsl"]
     assert cli.run(["diff", "~/old", "~/new"]) == 2
     assert f"{tmp_path}/old" in capfd.readouterr().err
 
