@@ -3,9 +3,12 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from reports.commands import main as cli
+from reports.figures.papers import PaperFigure
+from reports.plotting.figure import new_figure
 from validation.papers import claims as papers
 
 
@@ -45,3 +48,23 @@ def test_quick_leaves_out_what_needs_images(variant, experiments, capfd):
     printed = json.loads(capfd.readouterr().out)
     assert printed["left_out"] > 100
     assert {row["verdict"] for row in printed["papers"] if row["paper"] == "ali"} == {"impossible"}
+
+
+def test_figures_are_drawn_into_the_folder_with_their_data(variant, experiments, tmp_path, monkeypatch, capfd):
+    """The figure of the paper that is named, small where that is asked for; not those of other papers."""
+    made = []
+
+    def make(quick, progress):
+        made.append(quick)
+        images, rows = {"picture": np.ones((2, 3, 3))}, [{"depth": 1.5, "radiance": 0.25}]
+        return PaperFigure(lambda column: new_figure(1, 1), images, rows)
+
+    shown = {"slab": (("bouthors",), make), "others": (("biri",), lambda quick, progress: pytest.fail("of another"))}
+    monkeypatch.setattr("reports.figures.papers._FIGURES", shown)
+    folder = tmp_path / "figures"
+    assert cli.run(["paper", "bouthors", "--quick", "--figures", str(folder)]) == 0
+    names = ["slab.pdf", "slab.png", "slab-picture.exr", "slab.csv"]
+    assert capfd.readouterr().out.splitlines()[-4:] == [str(folder / name) for name in names]
+    assert sorted(path.name for path in folder.iterdir()) == sorted(names)
+    assert (folder / "slab.csv").read_text() == "depth,radiance\n1.5,0.25\n"
+    assert made == [True]

@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -138,7 +139,58 @@ def test_merged_files_of_two_machines(traced, tmp_path, monkeypatch, capfd):
         np.testing.assert_allclose(merged.layers[name], layer, rtol=1e-5, atol=1e-6 * layer.max())
     assert cli.run(["reference", SCENE[0], *files[:2], *files[:2], "-o", str(tmp_path / "no.exr")]) == 2
     assert "share the seeds 0-31" in capfd.readouterr().err
+    assert cli.run(["reference", "open-fog", *files, "-o", str(tmp_path / "no.exr")]) == 2
+    assert "merge: the files are of the scene sphere-spot, got open-fog; name that one" in capfd.readouterr().err
     assert not (tmp_path / "no.exr").exists()
+
+
+class Workers:
+    """A stub of a cluster: this process does the tasks of its two workers; `sent` are their names."""
+
+    def __init__(self):
+        self.sent = []
+
+    @contextmanager
+    def connected(self, place, **how):
+        assert place == 2
+        yield self
+
+    def scheduler_info(self, **how):
+        return {"workers": {"one": {}, "two": {}}}
+
+    def run_groups(self, cluster, groups, *, made):
+        from reports.cluster.run import _outcome
+
+        assert cluster is self
+        for task in (task for group in groups for task in group.tasks):
+            self.sent.append(task.name)
+            yield _outcome(task)
+
+
+@pytest.mark.claim("references-from-clusters", tolerance="none: byte for byte")
+@pytest.mark.parametrize(
+    ("estimator", "words", "sent"),
+    [
+        ("quadrature", [], ["reference 0"]),
+        ("volpath", ["--samples", "64", "--seed", "3"], [f"batch {seed}" for seed in range(3, 35)]),
+        ("volpath", ["--error", "0.02"], None),  # as many as that takes, in waves of 8 for each worker
+    ],
+)
+def test_workers_compute_what_the_cache_lacks_and_the_file_is_the_same(
+    traced, tmp_path, monkeypatch, estimator, words, sent
+):
+    """`tests/reports/commands/test_sweep.py` has the processes."""
+    pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
+    workers = Workers()
+    monkeypatch.setattr("reports.cluster.connect.connected", workers.connected)
+    monkeypatch.setattr("reports.cluster.references.run_groups", workers.run_groups)
+    run(tmp_path / "here.exr", *words, estimator=estimator)
+    monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "other"))
+    for name in ("there", "again"):
+        run(tmp_path / f"{name}.exr", *words, "--cluster", "local:2", estimator=estimator)
+        assert (tmp_path / f"{name}.exr").read_bytes() == (tmp_path / "here.exr").read_bytes()
+    assert len(workers.sent) == len(set(workers.sent))  # the second time nothing is lacking
+    assert workers.sent == sent if sent else len(workers.sent) % 16 == 0
 
 
 @pytest.mark.claim("runs-go-on")

@@ -43,6 +43,29 @@ def test_frames_of_objects_that_turn_are_judged_by_the_file_that_was_written_bes
     assert found.of.verdict.kind == "exact"
 
 
+def test_one_frame_has_no_file_of_changes(variant, tmp_path):
+    run("open-fog", *SMALL, "--frames", "1", "-o", str(tmp_path / "fog.exr"))
+    assert [path.name for path in tmp_path.iterdir()] == ["fog-0001.exr"]
+
+
+def test_the_plan_says_what_the_scene_needs_and_renders_nothing(variant, capfd):
+    run("open-fog", *SMALL, "--plan")
+    text = capfd.readouterr().out
+    run("open-fog", *SMALL, "--plan", "--json")
+    data = json.loads(capfd.readouterr().out)
+    assert data["plan"] == airlight.load_scene("open-fog").plan()
+    assert text.splitlines() == [f"{name}: {words}" for name, words in data["plan"].items()] + data["notes"]
+    assert "lights: 1 point\n" in text
+
+
+def test_a_configuration_is_rendered_as_its_words_are(variant):
+    chosen = airlight.configuration("unshadowed", "exact")
+    frame = airlight.render("open-fog", chosen, size=(8, 6))
+    assert (frame.method, frame.kernel) == ("unshadowed", "exact")
+    named = airlight.render("open-fog", "unshadowed", "exact", size=(8, 6))
+    np.testing.assert_array_equal(frame.airlight, named.airlight)
+
+
 @pytest.mark.claim("render-says-what-it-wrote")
 def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, tmp_path, capfd, monkeypatch):
     timed = []

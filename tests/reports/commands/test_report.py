@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command `airlight report`: what it refuses, and what it hands on; nothing is measured here but tiny frames."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
@@ -197,6 +199,69 @@ def test_with_images_alone_their_scenes_are_studied(variant, images, handed_on):
     assert run(["report", "--quick", "--images", str(images), "omni-box", "sphere-spot"]) == 0
     assert handed_on["scenes"] == ("omni-box", "sphere-spot")
     assert list(handed_on["images"]) == ["omni-box"]
+
+
+def test_images_of_other_scenes_than_those_that_are_named_are_refused(variant, images, handed_on, capsys):
+    assert run(["report", "--quick", "--images", str(images), "sphere-spot", "hall"]) == 2
+    assert "has no image of hall, sphere-spot, only of omni-box, open-fog" in capsys.readouterr().err
+    assert not handed_on
+
+
+def test_workers_of_a_cluster_are_handed_on_while_the_report_is_made(variant, tmp_path, handed_on, monkeypatch):
+    pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
+    open_places = []
+
+    @contextmanager
+    def connected(place):
+        open_places.append(place)
+        yield f"client of {place}"
+        open_places.remove(place)
+
+    monkeypatch.setattr("reports.cluster.connect.connected", connected)
+    assert run(["report", "open-fog", "--cluster", "local:3", "-o", str(tmp_path / "r")]) == 0
+    assert handed_on["cluster"] == "client of 3"
+    assert open_places == []
+
+
+@pytest.mark.claim("report-drawn-again")
+def test_a_page_is_drawn_in_its_place_with_the_figures_that_are_asked_for(tmp_path, monkeypatch, capsys):
+    """`tests/reports/figures` draws them."""
+    from tests.helpers.page import write_report_files
+
+    folder, asked = write_report_files(tmp_path / "r"), []
+
+    def write_figures(target, column, **chosen):
+        asked.append((target, column, chosen))
+        return (f"{target}/strip.pdf",)
+
+    monkeypatch.setattr("reports.figures.report.write_figures", write_figures)
+    data = (folder / "report.json").read_bytes()
+    words = ["hall", "--figures", "single", "--method", "good (k)"]
+    assert run(["report", "--from", str(folder / "report.json"), *words]) == 0
+    assert asked == [(folder, "single", {"scene": "hall", "labels": ["good (k)"]})]
+    printed = capsys.readouterr().out
+    assert f"{folder}/report.html: 1 scene, drawn again\n{folder}/strip.pdf\n" in printed
+    assert (folder / "report.json").read_bytes() == data
+    assert "The reference is confirmed." in (folder / "report.html").read_text(encoding="utf-8")
+    assert run(["report", "--from", str(folder), "hall", "fog", "--figures", "single"]) == 2
+    assert "the strip shows one scene; name one of them" in capsys.readouterr().err
+    assert run(["report", "--from", str(folder), "hall"]) == 2
+    assert "from: the report is drawn again; leave out a scene" in capsys.readouterr().err
+
+
+@pytest.mark.claim("report-drawn-again")
+def test_a_report_in_a_notebook_has_its_claims_and_leads_to_its_page(tmp_path, monkeypatch):
+    import airlight
+    from tests.helpers.page import write_report_files
+
+    report = airlight.report(from_=write_report_files(tmp_path / "r"))
+    assert repr(report) == f"Report({str(tmp_path / 'r')!r}, 1 scenes)"
+    shown = report._repr_html_()
+    assert "<strong>Report on hall, 2026-11-21 12:34:56 +0000</strong>" in shown
+    assert "<li>The reference is confirmed.</li>" in shown
+    assert f'<a href="{(tmp_path / "r" / "report.html").as_uri()}">' in shown
+    monkeypatch.chdir(tmp_path)
+    assert '<a href="r/report.html">' in report._repr_html_()  # a notebook shows files below its folder alone
 
 
 @pytest.mark.claim("report-drawn-again")
