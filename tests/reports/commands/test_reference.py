@@ -184,6 +184,7 @@ def test_workers_compute_what_the_cache_lacks_and_the_file_is_the_same(
     workers = Workers()
     monkeypatch.setattr("reports.cluster.connect.connected", workers.connected)
     monkeypatch.setattr("reports.cluster.references.run_groups", workers.run_groups)
+    monkeypatch.setattr("reports.cluster.references.facts", lambda: None)  # which takes long
     run(tmp_path / "here.exr", *words, estimator=estimator)
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "other"))
     for name in ("there", "again"):

@@ -1,11 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
+"""Each sentence at the top of a report follows from its numbers: which there are, and what they say is good."""
+
 import copy
 
 import pytest
 
+from reports.data.records import Claim
 from reports.report import claims as made
-from tests.helpers.reports import RUN, agreement, checked, entry, report_of, scene
+from tests.helpers.reports import (
+    RUN,
+    agreement,
+    checked,
+    engine,
+    entry,
+    errors,
+    flip,
+    growth_record,
+    record_of,
+    report_of,
+    scene,
+)
 from tests.helpers.reports import refused as refused_entry
+from validation.timing import Scaling
 
 
 def method(label, rmse, median, *, refused=None):
@@ -87,6 +103,10 @@ def test_out_of_time_is_neither_confirmed_nor_against_the_reference():
     assert not confirmed(data)
     data[1]["agreement"]["single-scatter airlight"] = agreed(True, 1e-5, estimator="single-scatter")
     assert confirmed(data)
+    # Where nothing was decided, nothing is called confirmed.
+    only = claims([scene("hall", [], agreement={"airlight": out_of_time([-0.01, 0.004])})])[0]
+    assert only.good is None
+    assert only.text.startswith("By Mitsuba's volpath it is not decided within the time in hall (airlight, ±0.5 %)")
 
 
 def test_what_failed_is_named_with_its_pixels():
@@ -109,3 +129,100 @@ def test_a_machine_that_changed_while_a_scene_was_timed_is_named():
         "2026-11-22 07:00:00 +0000. The machine changed meanwhile, so that ratios count there, and no milliseconds: "
         "hall (1.70 times between rounds, 1.02 within one)."
     )
+
+
+@pytest.mark.claim("claims-follow")
+def test_what_was_refused_and_what_was_left_out_for_its_time_are_named_apart():
+    data = scenes()
+    data[0]["methods"].append(refused_entry("picky", "no series"))
+    data[1]["methods"] += [refused_entry("picky", "no series"), refused_entry("slow", "one hour", status="left out")]
+    assert [claim.kind for claim in claims(data)] == ["reference", "left-out", "refused", "not-measured", "times"]
+    assert texts(data)[2:4] == [
+        "Refused, with the reason in the tables: picky in fog; picky in hall.",
+        "Not measured for the time that they take, with the reason in the tables: slow in hall.",
+    ]
+
+
+def test_scenes_that_an_effort_leaves_out_are_named():
+    assert made.unstudied(["fog", "hall"], ["hall", "fog"]) == []
+    (claim,) = made.unstudied(["hall"], ["fog", "hall", "pens"])
+    assert claim.text == (
+        "Scenes not studied, for the time that they take: fog, pens. A scene that is named is studied, `--full` has "
+        "all."
+    )
+
+
+@pytest.mark.claim("claims-follow")
+def test_a_time_that_jumps_as_the_work_grows_is_bad_and_none_is_good():
+    calm, jumps = (record_of(growth_record(cliff=cliff), Scaling) for cliff in (False, True))
+    assert made.growth_claims([]) == []
+    said = "No time of a frame of hall jumps as the work grows: triangles."
+    assert made.growth_claims([calm]) == [Claim(kind="growth", text=said, good=True)]
+    (claim,) = made.growth_claims([calm, jumps])
+    assert claim.text.startswith("A time jumps: hall, shadow-planes (exact): frame grows with the power 1.9")
+    assert claim.good is False
+
+
+@pytest.mark.claim("claims-follow")
+def test_without_light_nothing_is_confirmed_and_nothing_speaks_against_it():
+    first = claims([scene("night", [], agreement={})])[0]
+    assert (first.kind, first.good) == ("reference", None)
+    assert "no airlight and no lit surface in any scene" in first.text
+
+
+@pytest.mark.claim("claims-follow")
+def test_an_engines_image_has_its_errors_and_what_they_are_of():
+    data = scenes()
+    data[0]["methods"] += [
+        engine("unity", error=errors(0.123, relative_bias=-0.045)),
+        engine("unreal", 0.02, layer="airlight"),
+        engine("black", None),  # of a scene without light nothing is relative
+    ]
+    found = [claim.text for claim in claims(data) if claim.kind == "image"]
+    assert found == [
+        "The image unity of fog, judged by its total of airlight and surface: "
+        "relative RMSE 12.3 %, relative bias -4.5 %.",
+        "The image unreal of fog, judged by its airlight: relative RMSE 2 %, relative bias +0.2 %.",
+    ]
+
+
+def test_errors_that_a_paper_has_too_are_published_and_no_failures():
+    data = scenes()
+    wrong = errors(0.1, negative=1)
+    data[0]["methods"] += [entry("biri (taylor)", error=wrong), entry("mine (exact)", error=wrong)]
+    found = [(claim.kind, claim.text, claim.good) for claim in claims(data) if "negative" in claim.text]
+    assert found == [
+        ("failed", "Images with negative values: mine (exact) in fog (1 pixel).", False),
+        (
+            "published",
+            "As the papers have it, images with negative values: biri (taylor) in fog (1 pixel).",
+            None,
+        ),
+    ]
+
+
+def test_images_without_flip_are_counted_with_the_reason_of_the_first():
+    data = scenes()
+    data[0]["methods"][0]["flip"] = flip(0.1)
+    assert not any("FLIP" in text for text in texts(data))
+    data[0]["methods"][1]["flip"] = flip(None, "no package here")
+    assert "No HDR-FLIP of 1 image; of good in fog: no package here." in texts(data)
+    data[1]["methods"][1]["flip"] = flip(None, "another reason")
+    assert "No HDR-FLIP of 2 images; of good in fog: no package here." in texts(data)
+
+
+@pytest.mark.claim("own-method-faults")
+def test_faults_of_user_methods_are_told_once_and_refusals_are_none():
+    def row(method, reason, **changes):
+        return refused_entry(method, reason, method=method, **{"kind": "function"} | changes)
+
+    fault = "method mine.py:f: line 3: KeyError: 'x'"
+    rows = [
+        row("mine.py:f", fault),
+        row("mine.py:f", fault),
+        row("mine.py:g", "method mine.py:f: of another"),
+        row("mine.py:h", "the medium has bounds"),
+        row("ray-march", "method ray-march: no", kind="built-in"),
+        entry("mine.py:i", method="mine.py:i", kind="function"),
+    ]
+    assert made.own_faults(checked(report_of([scene("fog", rows)])).scenes[0].methods) == [fault]

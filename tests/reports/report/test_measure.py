@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A report holds what its study asks for, in whole files; kept parts are found again, and efforts add parts."""
 
+import errno
 import json
+import os
+import time
 from dataclasses import asdict, replace
 from functools import wraps
 from types import SimpleNamespace
@@ -10,14 +13,21 @@ import numpy as np
 import pytest
 
 from analytic.errors import InputError
+from reference.storage.exr import Image, read_exr, write_exr
 from reports.data.records import named_files, read_report, report_text
+from reports.machine.own_process import EndedError
 from reports.report.measure import staged, write_report
 from reports.report.others import other_parts
 from reports.report.scene import file_stems, folder_of, reference_record
 from tests.helpers.page import small_report, write_report_files
+from tests.helpers.reports import growth_record, record_of, stable
 from tests.helpers.scenes import LAMP, scene_xml
-from validation.study.configuration import Configuration
+from validation.kernels.records import Stability
+from validation.scenes.loading import scene_stem
+from validation.study.configuration import Configuration, configuration
+from validation.study.run import PROBE
 from validation.study.study import STUDIES, Checks, Measure, Study, standard_study
+from validation.timing import Scaling
 
 FLOOR = '<shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>'
 FOG = '<float name="sigma_t" value="0.31"/><rgb name="albedo" value="0.9, 0.8, 0.7"/>'
@@ -96,7 +106,6 @@ def test_the_data_are_read_again_and_every_file_that_they_name_is_there(written)
 
 
 def test_images_can_be_read_and_give_the_errors_of_the_table(written):
-    from reference.storage.exr import read_exr
     from validation.metrics.errors import error_metrics
 
     (scene,) = written.data["scenes"]
@@ -207,6 +216,160 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
     assert measured["scenes"][0]["reference"]["mean"] != written.data["scenes"][0]["reference"]["mean"]
 
 
+@pytest.mark.claim("report-kept")
+def test_an_engines_image_is_judged_at_its_size_by_the_reference_that_is_kept(written, variant, tmp_path):
+    from validation.engine.images import EngineImage
+
+    path, (scene,) = tmp_path / "my <fog>.exr", written.data["scenes"]
+    image = read_exr(written.folder / scene["files"]["exr"])
+    write_exr(path, Image({"airlight": np.float32(1.01) * image.layers["airlight"]}))
+    shown = {scene_stem(scene["path"]): (EngineImage("my <fog>", "engine", path),)}
+    study = replace(TINY, scenes=(scene["path"],), sizes=((16, 12),), configurations=())
+    data = as_json(write_report(tmp_path / "again", study, images=shown))
+    (judged,) = data["scenes"]
+    assert judged["size"] == [20, 15]  # that of the image
+    assert data["computed"] == 1  # the image
+    (row,) = judged["methods"]
+    assert (row["kind"], row["label"], row["times"]) == ("image", "engine", None)
+    assert row["error"]["relative_bias"] == pytest.approx(0.01, rel=1e-4)
+    assert any("The image engine of my <fog>, judged by its airlight" in claim["text"] for claim in data["claims"])
+
+
+# Methods of the user
+
+
+def at_fault(view, *, kernel=None):
+    return {}["nothing"]
+
+
+def fails_in_small_frames(view, *, kernel=None):
+    if len(view.pixel) < 64 * 48:
+        raise RuntimeError("too small")
+    return 1.0
+
+
+@pytest.mark.claim("own-method-faults", "files-whole-or-not-at-all")
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [(at_fault, r"KeyError: 'nothing'$"), (fails_in_small_frames, r"RuntimeError: too small$")],
+    ids=["in the first small frame", "in a frame of the report"],
+)
+def test_a_fault_of_a_function_that_runs_here_ends_the_report_and_nothing_is_written(
+    written, variant, tmp_path, method, words
+):
+    with pytest.raises(InputError, match=rf"test_measure\.py, line \d+: {words}"):
+        again(written, tmp_path, configurations=(configuration(method),))
+    assert content_names(tmp_path) == []
+
+
+@pytest.mark.claim("own-method-process")
+def test_a_method_that_ends_its_process_is_told_at_once_and_is_a_row_with_the_reason(
+    written, variant, tmp_path, monkeypatch, capsys
+):
+    calls = []
+
+    def ends(function, cell, *, name):
+        calls.append(cell.size)
+        raise EndedError(f"method {name}: ended its process, killed by SIGABRT")
+
+    monkeypatch.setattr("reports.report.measure.in_own_process", ends)
+    study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),))
+    (ended,) = write_report(tmp_path / "again", study, apart=True).scenes[0].methods
+    assert (ended.status, ended.times) == ("refused", None)
+    assert ended.reason.endswith("ended its process, killed by SIGABRT")
+    assert capsys.readouterr().err == f"airlight: warning: {ended.reason}; the report goes on\n"
+    assert calls == [PROBE]  # it is not called again
+
+
+def test_a_refusal_by_a_users_method_is_no_fault(written, variant, tmp_path, monkeypatch, capsys):
+    def refuses(function, cell, *, name):
+        raise InputError("the medium has bounds")
+
+    monkeypatch.setattr("reports.report.measure.in_own_process", refuses)
+    study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),))
+    (row,) = write_report(tmp_path / "again", study, apart=True).scenes[0].methods
+    assert (row.status, row.reason) == ("refused", "the medium has bounds")
+    assert capsys.readouterr().err == ""
+
+
+def test_the_device_of_shaders_is_part_of_the_machine(variant, tmp_path, monkeypatch):
+    monkeypatch.setattr("reports.report.measure.require_opengl", lambda: "llvmpipe 25.0")
+    for method, device in (("fog.glsl", "llvmpipe 25.0"), ("ray-march", None)):
+        report = write_report(tmp_path, replace(TINY, configurations=(Configuration(method),)))
+        assert report.environment.opengl == device
+
+
+# What belongs to no scene
+
+
+def test_stability_and_growth_have_their_records_their_time_and_are_kept(written, variant, tmp_path, monkeypatch):
+    """Stubs measure: `tests/validation` has what they measure."""
+    from reports.report import others
+
+    measured = []
+
+    def stability(*given, count):
+        measured.append(("stability", count))
+        return [record_of(stable("exact", "a bar"), Stability)]
+
+    def growth(study, work, steps, *, progress):
+        measured.append((work, study.measure.seconds))
+        return [record_of(growth_record(cliff=True), Scaling)]
+
+    monkeypatch.setattr("validation.kernels.stability.stability", stability)
+    monkeypatch.setattr("validation.study.growth.study_growth", growth)
+    monkeypatch.setattr("validation.study.growth.ladder", lambda *given: [])
+    monkeypatch.setattr(others, "in_own_process", lambda function, *given, **how: function(*given))
+    small = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=())
+    monkeypatch.setattr(others, "standard_study", lambda name: small)
+    study = replace(small, stability=17, growth=("size",))
+    report = write_report(tmp_path / "one", study)
+    assert measured == [("stability", 17), ("size", TINY.measure.seconds)]
+    assert [each.broken for each in report.stability] == [("a bar",)]
+    assert report.claims[-1].text.startswith("A time jumps: hall, shadow-planes (exact)")
+    assert (report.computed, report.cached) == (2, 3)
+    assert set(report.parts) == {"scenes", "stability", "scaling", "papers"}
+    assert read_report(tmp_path / "one").scaling == report.scaling
+    repeated = write_report(tmp_path / "two", study)
+    assert len(measured) == 2
+    assert (repeated.computed, repeated.cached) == (0, 5)
+    assert (repeated.stability, repeated.scaling) == (report.stability, report.scaling)
+
+
+@pytest.mark.claim("reports-from-clusters")
+def test_workers_compute_the_references_and_are_asked_for_the_batches_that_check_them(
+    written, variant, tmp_path, monkeypatch, own_cache
+):
+    """A stub of the workers: `tests/reports/cluster` has processes."""
+    pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
+    from reports.cluster.run import _outcome
+
+    sent, spreads = [], []
+
+    def run_groups(cluster, groups, *, made):
+        for task in (task for group in groups for task in group.tasks):
+            sent.append(task.name)
+            yield _outcome(task)
+
+    def agreements(scene, margins, *, spread, **options):
+        spreads.append(spread("volpath", 4, None))
+        return {}
+
+    monkeypatch.setattr("reports.cluster.references.facts", lambda: None)
+    cluster = SimpleNamespace(scheduler_info=lambda **how: {"workers": {"one": {}, "two": {}}})
+    monkeypatch.setattr("reports.cluster.references.run_groups", run_groups)
+    monkeypatch.setattr("validation.study.scene.agreements", agreements)
+    multiple = written.data["scenes"][0]["multiple"]
+    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
+    study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=())
+    data = as_json(write_report(tmp_path / "again", study, cluster=cluster))
+    assert sent == ["reference 0"]
+    assert data["scenes"][0]["reference"] == written.data["scenes"][0]["reference"]
+    ((bring, at_once),) = spreads
+    assert callable(bring)
+    assert at_once == 2 * 8
+
+
 @pytest.mark.parametrize(
     ("scene", "folder"),
     [("hall", "hall"), ("a/my <fog> #2.xml", "my-fog-2"), ("a/..xml", "scene"), ("random:7", "random-7")],
@@ -298,6 +461,26 @@ def test_an_exception_leaves_everything_as_it_was(tmp_path, stop):
         work()
     assert content(tmp_path) == {"report.html": "old"}
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+@pytest.mark.claim("files-whole-or-not-at-all")
+def test_a_full_disk_names_the_folder_that_the_user_knows_and_other_faults_are_as_they_are(tmp_path):
+    for number, name in ((errno.ENOSPC, str(tmp_path)), (errno.EACCES, "hidden.exr")):
+        with pytest.raises(OSError, match=os.strerror(number)) as raised, staged(tmp_path):
+            raise OSError(number, os.strerror(number), "hidden.exr")
+        assert raised.value.filename == name
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_remains_of_a_killed_run_go_after_a_day(tmp_path):
+    for name, hours in (("old", 25), ("young", 23)):
+        remains = tmp_path / f".airlight-report-{name}"
+        remains.mkdir()
+        (remains / "a.exr").write_text("half")
+        os.utime(remains, times=(time.time() - 3600 * hours,) * 2)
+    with staged(tmp_path):
+        pass
+    assert content_names(tmp_path) == [".airlight-report-young/a.exr"]
 
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
