@@ -2,7 +2,9 @@
 """The command line's own duties: help, usage, exit statuses, one line for each mistake."""
 
 import json
+import os
 import re
+import sys
 
 import pytest
 
@@ -40,6 +42,7 @@ def command_that_raises(monkeypatch):
         (MissingError("no libLLVM"), 3, "airlight: error: no libLLVM"),
         (FileNotFoundError(2, "No such file or directory", "a.exr"), 2, "error: a.exr: No such file or directory"),
         (PermissionError(13, "Permission denied", "out"), 2, "error: out: Permission denied"),
+        (OSError(28, "No space left on device"), 2, "error: output: No space left on device"),
     ],
     ids=lambda value: type(value).__name__,
 )
@@ -53,10 +56,70 @@ def test_expected_failures_give_one_line(error, status, words, command_that_rais
     assert captured.err.count("\n") == 1
 
 
-def test_faults_of_the_program_keep_their_traceback(command_that_raises):
-    command_that_raises(ValueError("not an InputError"))
-    with pytest.raises(ValueError, match="not an InputError"):
+@pytest.mark.parametrize(
+    "error",
+    [ValueError("a fault"), OSError(5, "a fault"), ImportError("a fault"), NameError("a fault")],
+    ids=lambda error: type(error).__name__,
+)
+def test_faults_of_the_program_keep_their_traceback(error, command_that_raises, monkeypatch):
+    monkeypatch.setattr(cli, "missing_packages", list)
+    command_that_raises(error)
+    with pytest.raises(type(error), match="a fault"):
         cli.run(["list"])
+
+
+@pytest.mark.claim("exit-status")
+@pytest.mark.parametrize("error", [ImportError("libLLVM.so"), NameError("drjit_ext")], ids=lambda e: type(e).__name__)
+def test_a_system_library_that_is_missing_is_named_with_how_to_install_it(
+    error, command_that_raises, monkeypatch, capsys
+):
+    monkeypatch.setattr(cli, "missing_packages", lambda: ["libllvm19", "libatomic1"])
+    command_that_raises(error)
+    assert cli.run(["list"]) == 3
+    said = capsys.readouterr().err
+    assert "system libraries are missing. To install them: `" in said
+    assert "apt-get install -y libllvm19 libatomic1` on Debian" in said
+
+
+@pytest.mark.claim("exit-status")
+def test_ctrl_c_ends_with_the_status_of_a_shell(command_that_raises, capsys):
+    command_that_raises(KeyboardInterrupt())
+    assert cli.run(["list"]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.claim("exit-status")
+def test_without_a_command_the_help_is_printed_and_the_use_is_wrong(capsys):
+    assert cli.run([]) == 2
+    assert "Usage: airlight" in capsys.readouterr().out
+
+
+@pytest.mark.claim("exit-status")
+def test_a_folder_that_was_deleted_is_said_before_any_work(tmp_path, monkeypatch, capsys):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert cli.run(["list"]) == 2
+    assert capsys.readouterr().err == (
+        "airlight: error: the current folder was deleted: change into another folder, then run this again\n"
+    )
+
+
+@pytest.mark.parametrize(("closed", "status"), [(True, 1), (False, 2)], ids=["reader left", "disk full"])
+def test_an_output_that_cannot_be_written_is_written_no_more(closed, status, monkeypatch, capsys):
+    """What is still in the buffer would fail when Python ends."""
+    if closed:
+        read, write = os.pipe()
+        os.close(read)
+    else:
+        write = os.open("/dev/full", os.O_WRONLY)
+    with os.fdopen(write, "w") as output:
+        monkeypatch.setattr(sys, "stdout", output)
+        assert cli.run(["list", "kernels"]) == status
+        output.write("more")
+        output.flush()
+    said = capsys.readouterr().err
+    assert said == ("" if closed else "airlight: error: output: No space left on device\n")
 
 
 @pytest.mark.claim("documented-commands")

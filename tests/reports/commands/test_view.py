@@ -3,11 +3,13 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 import urllib.request
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -31,6 +33,23 @@ def test_without_the_extra_one_line_says_what_to_type(monkeypatch, capfd):
         "airlight: error: the live view needs the package websockets: "
         "`./airlight view` brings it in a clone, `pip install websockets` elsewhere\n"
     )
+
+
+def test_a_port_that_is_taken_is_said_and_the_reference_ends(variant, monkeypatch, capfd):
+    pytest.importorskip("websockets", reason="the extra `view` is not installed")
+    ended = []
+    reference = SimpleNamespace(end=lambda: ended.append(True))
+    session = SimpleNamespace(reference=reference, opened=None, told=None, closed=None)
+    monkeypatch.setattr("reports.view.session.Session", lambda state, variant: session)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        run("open-fog", *SMALL, "--address", f"127.0.0.1:{port}", status=2)
+    printed = capfd.readouterr()
+    assert printed.out == ""
+    assert f"address: cannot listen at 127.0.0.1, port {port}: Address already in use" in printed.err
+    assert ended == [True]
 
 
 def _children(parent):
