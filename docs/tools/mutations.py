@@ -8,14 +8,15 @@ in words, since a mutation may change nothing that anybody sees.
 
 The mutations are those of Cosmic Ray (`pip install cosmic-ray pytest-cov`): a comparison, an operator or a number is
 replaced, a condition is turned, a loop does not run. They are drawn from all mutations of the rooms with equal chances.
-The tests of a line come from a run of the default tests with coverage, whose contexts say which test runs which line. A
-line that runs once, when its file is imported, has the tests that run anything of the file. The fastest are run first,
-and no more of them than take LONGEST.
+The tests of a line come from a run of the default tests with coverage, whose contexts say which test runs which line;
+`--baseline` keeps that run for another draw. A line that runs once, when its file is imported, has the tests that run
+anything of the file. The fastest are run first, and no more of them than take LONGEST.
 """
 
 import argparse
 import ast
 import json
+import os
 import random
 import shutil
 import subprocess
@@ -110,28 +111,32 @@ def mutated(mutation: Mutation, text: str) -> str | None:
     return None if changed in (None, text) else str(changed)
 
 
-def covering_tests(rooms: Sequence[str]) -> tuple[dict[tuple[str, int], set[str]], dict[str, float]]:
-    """Run the default tests; return the tests of each line of the rooms, and what each test took [s]."""
+def covering_tests(rooms: Sequence[str], folder: Path) -> tuple[dict[tuple[str, int], set[str]], dict[str, float]]:
+    """Return the tests of each line of the rooms, and what each test took [s], from a run whose data are in a folder.
+
+    Without data the default tests are run there.
+    """
     from coverage import CoverageData
 
-    with tempfile.TemporaryDirectory() as folder:
+    if not (folder / "tests.xml").exists():
+        folder.mkdir(parents=True, exist_ok=True)
         measured = [f"--cov={room}" for room in rooms]
-        options = ["--cov-context=test", "--cov-report=", f"--junit-xml={folder}/tests.xml"]
-        subprocess.run([ROOT / "airlight", "test", "-q", *measured, *options], cwd=ROOT, check=True)
-        suite = ElementTree.parse(f"{folder}/tests.xml")
+        options = ["--cov-context=test", "--cov-report=", f"--junit-xml={folder.resolve()}/tests.xml"]
+        where = os.environ | {"COVERAGE_FILE": str(folder.resolve() / "coverage")}
+        subprocess.run([ROOT / "airlight", "test", "-q", *measured, *options], cwd=ROOT, env=where, check=True)
     took: dict[str, float] = {}
-    for case in suite.iter("testcase"):
+    for case in ElementTree.parse(folder / "tests.xml").iter("testcase"):
         place = case.get("classname", "").replace(".", "/")
         took[f"{place}.py::{case.get('name')}"] = float(case.get("time", 0))
-    data = CoverageData(str(ROOT / ".coverage"))
+    data = CoverageData(str(folder / "coverage"))
     data.read()
     tests = defaultdict(set)
-    for file in data.measured_files():
-        path = Path(file).relative_to(ROOT).as_posix()
-        for line, contexts in data.contexts_by_lineno(file).items():
-            # A context is 'tests/a/test_b.py::test_c[d]|run'; what is set up for a test is no test.
-            tests[path, line] |= {name.partition("|")[0] for name in contexts if name.endswith("|run")}
-    (ROOT / ".coverage").unlink()
+    for path in (path for room in rooms for path in sorted((ROOT / room).rglob("*.py"))):
+        name = path.relative_to(ROOT).as_posix()
+        for file in (file for file in data.measured_files() if file.endswith("/" + name)):
+            for line, contexts in data.contexts_by_lineno(file).items():
+                # A context is 'tests/a/test_b.py::test_c[d]|run'; what is set up for a test is no test.
+                tests[name, line] |= {each.partition("|")[0] for each in contexts if each.endswith("|run")}
     return tests, took
 
 
@@ -204,27 +209,29 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=300, help="how many mutations are drawn")
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--jobs", type=int, default=2, help="how many are tried at a time")
+    parser.add_argument("--baseline", type=Path, help="folder that keeps the run of all tests; by default none does")
     asked = parser.parse_args()
     every = list(mutations(asked.rooms))
     chosen = random.Random(asked.seed).sample(every, min(asked.sample, len(every)))
-    found, took = covering_tests(asked.rooms)
+    with tempfile.TemporaryDirectory() as folder:
+        found, took = covering_tests(asked.rooms, asked.baseline or Path(folder))
     outcomes, start = [], time.monotonic()
     for each in survey(chosen, found, took, asked.jobs):
         outcomes.append(each)
         if each.survived:
             print(f"survives {each.mutation.path}:{each.mutation.line} ({each.tests} tests): {each.change}", flush=True)
-    survivors = [each for each in outcomes if each.survived]
-    record = {
-        "date": time.strftime("%Y-%m-%d"),
-        "rooms": list(asked.rooms),
-        "of": len(every),
-        "sample": len(outcomes),
-        "seed": asked.seed,
-        "survived": len(survivors),
-        "untested": sum(each.tests == 0 for each in survivors),
-        "survivors": [asdict(each) for each in survivors],
-    }
-    RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        survivors = [each for each in outcomes if each.survived]
+        record = {
+            "date": time.strftime("%Y-%m-%d"),
+            "rooms": list(asked.rooms),
+            "of": len(every),
+            "sample": len(outcomes),
+            "seed": asked.seed,
+            "survived": len(survivors),
+            "untested": sum(each.tests == 0 for each in survivors),
+            "survivors": [asdict(each) for each in survivors],
+        }
+        RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     minutes = (time.monotonic() - start) / 60
     print(f"{len(survivors)} of {len(outcomes)} survived, in {minutes:.0f} minutes; written: {RECORD}")
 
