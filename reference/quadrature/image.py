@@ -36,8 +36,19 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _POSITIONS = PointPlan(first=4, most=128)  # of each replicate in a pixel
-_OF_LIGHTS = 4  # samples of area lights for each position, eight times
+_LIGHTS = PointPlan(error=0.0, first=4, most=4)  # of each replicate of a position
 _CHUNK = 1 << 17  # rays at once
+
+
+def rays_of_pixel(pixel: str) -> tuple[int, int]:
+    """Return how many rays a pixel, 'centre' or 'area', takes at least and at most."""
+    least, most = _POSITIONS.points if pixel == "area" else (0, 0)
+    return least + 1, most + 1  # the centre has the distance and the checks of the pixel
+
+
+def light_samples_of_ray(pixel: str) -> tuple[int, int]:
+    """Return how many samples of an area light a ray of a pixel, 'centre' or 'area', takes at least and at most."""
+    return (_LIGHTS if pixel == "area" else PointPlan()).points
 
 
 def quadrature_image(
@@ -120,7 +131,6 @@ def _means(
     corner = pixel_centres(size) - 0.5
     sensor = reference.scene.sensors()[0]
     seed = plan.seed if plan is not None else 0
-    lights = PointPlan(error=0.0, first=_OF_LIGHTS, most=_OF_LIGHTS)
     bounds, checks = np.zeros((len(corner), 3)), list[RandomChecks]()
     # Replicates are looked at together, but under area lights each has samples of them of its own.
     groups = [[replicate] for replicate in range(REPLICATES)] if reference.is_sampled else [list(range(REPLICATES))]
@@ -138,7 +148,7 @@ def _means(
                 square = points[pixels].reshape(len(pixels), REPLICATES, chosen.most, 2)[:, group]
                 positions = (corner[pixels, None, None] + square).reshape(-1, 2)
                 seeds = np.random.default_rng((chosen.seed, chosen.most, group[0], first))
-                of_lights = replace(lights, seed=int(seeds.integers(1 << 62)))
+                of_lights = replace(_LIGHTS, seed=int(seeds.integers(1 << 62)))
                 direction = film_directions(sensor, positions, size)
                 ray = ray_values(replace(reference, direction=direction), plan=of_lights, shapes=shapes, **how)
                 emitted = ray.emitted.reshape(len(direction), -1)
@@ -153,7 +163,7 @@ def _means(
                 progress(done, rounds, "positions in pixels")
         return np.moveaxis(np.concatenate(total, axis=1), 1, 2)
 
-    centre = ray_values(reference, plan=lights, shapes=shapes, **how)
+    centre = ray_values(reference, plan=_LIGHTS, shapes=shapes, **how)
     chosen = replace(_POSITIONS, error=tolerance, seed=seed)
     known = np.zeros((len(corner), 6 + 3 * bool(centre.emitted.size)))
     means, counts = replicate_means(len(corner), known, chosen, sums)

@@ -85,6 +85,27 @@ class PointPlan:
         """How often the first points can be doubled, and once more."""
         return 1 + int(np.log2(max(1, self.most // max(1, self.first))))
 
+    @property
+    def points(self) -> tuple[int, int]:
+        """How many points a ray takes at least and at most: of all replicates, with its pilots."""
+        if not self.decides:
+            return REPLICATES * self.most, REPLICATES * self.most
+        return REPLICATES * (sum(self.pilots[:1]) + self.first), REPLICATES * (sum(self.pilots) + self.most)
+
+    @property
+    def decides(self) -> bool:
+        """Whether a pilot chooses the points of a ray."""
+        return self.error > 0 and self.first < self.most
+
+    @property
+    def pilots(self) -> list[int]:
+        """The points of each replicate that pilots take, one after the other."""
+        counts, count = list[int](), max(1, self.first // 2)
+        while 2 * count < self.most:
+            counts.append(count)
+            count *= _AHEAD
+        return counts
+
 
 def square_points(plan: PointPlan, number: int, replicate: int, kind: str) -> Array:
     """Return the points of the unit square of a replicate of a light, (plan.most, 2) [1].
@@ -175,7 +196,7 @@ def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tup
     points give in each replicate, added up, (rays, columns, replicates).
     """
     counts = np.full(rays, plan.most)
-    if plan.error > 0 and plan.first < plan.most:
+    if plan.decides:
         counts = _planned(rays, known, plan, sums)
     means = np.zeros((*known.shape, REPLICATES))
     for count in sorted(set(counts.tolist())):
@@ -186,9 +207,11 @@ def replicate_means(rays: int, known: Array, plan: PointPlan, sums: Sums) -> tup
 
 def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
     """Return how many points each ray needs."""
-    counts, active, count = np.full(rays, plan.most), np.arange(rays), max(1, plan.first // 2)
+    counts, active = np.full(rays, plan.most), np.arange(rays)
     floor: Array | None = None
-    while len(active) and 2 * count < plan.most:
+    for count in plan.pilots:
+        if not len(active):
+            break
         pilot = replace(plan, seed=plan.seed + _PILOT_SEED, most=count)
         mean = sums(PILOT, pilot, active) / count
         value = mean.mean(axis=-1) + known[active]
@@ -200,7 +223,7 @@ def _planned(rays: int, known: Array, plan: PointPlan, sums: Sums) -> Index:
         near = needed * plan.first <= _AHEAD * count
         foreseen = plan.first << np.ceil(np.log2(needed)).astype(int)
         counts[active[near]] = np.maximum(foreseen[near], count)
-        active, count = active[~near & (foreseen < plan.most)], _AHEAD * count
+        active = active[~near & (foreseen < plan.most)]
     return counts
 
 

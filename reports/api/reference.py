@@ -146,7 +146,7 @@ def reference(
 
     loaded = opened(scene, pixels_of(size), changes)
     note(progress, scene_notes(loaded.scene))
-    _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None)
+    note(progress, _check_work(loaded, estimator, pixel, budget, clouds=wanted is not None))
 
     def compute(tell: Callable[[float, str], None], workers: "Client | None" = None) -> "Reference":
         elsewhere = None
@@ -165,16 +165,19 @@ def reference(
             return compute(tell, workers)
 
 
-def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool) -> None:
+def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool) -> tuple[str, ...]:
+    """Refuse what takes too long, and return what a user should know of the time."""
     from validation.study.cost import check_work, reference_work, sampled_work
 
     size = loaded.size if loaded.scene.sensors() else (1, 1)
     if budget is None:
-        area = 16 if pixel == "area" else 1  # rays in a pixel
-        work = reference_work(size, lights=len(loaded.scene.emitters()), images=area)
+        emitters = loaded.scene.emitters()
+        area_lights = sum(emitter.class_name() == "AreaLight" for emitter in emitters)
+        work = reference_work(size, lights=len(emitters) - area_lights, area_lights=area_lights, pixel=pixel)
     else:
         work = sampled_work(size, budget.samples or 64, clouds=clouds)
-    check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {estimator}", [work])
+    kind = f"{estimator} of areas" if pixel == "area" else estimator
+    return check_work(f"reference {loaded.name}, {size[0]} x {size[1]}, {kind}", [work])
 
 
 def _elsewhere(

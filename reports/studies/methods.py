@@ -81,7 +81,7 @@ def check_study(
     for each in loaded:
         scene = read_scene(each.scene)
         note(progress, scene.features.notes)
-        works.append(reference_work(each.size, lights=len(scene.lights) + len(scene.area_lights)))
+        works.append(reference_work(each.size, lights=len(scene.lights), area_lights=len(scene.area_lights)))
         works += [configuration_work(scene, one, frames or TIMED) for one in chosen]
     check_work(what, works)
 

@@ -3,9 +3,10 @@
 
 The costs are those of one processor thread, measured on two threads of an AMD EPYC on 22 November 2026 and rounded; a
 scene can be some times cheaper or costlier, and a machine faster or slower. That is enough to share a progress bar out
-among its parts. A command is refused for its time only where it would take longer than an hour on threads that are
-`_FASTER` times as fast, too. Whether one frame keeps a limit is another question: the code of a user's method cannot be
-counted, and `validation.study.run` times a small frame instead.
+among its parts, and for a note where a command may take minutes. A command is refused for its time only where the least
+that it needs takes longer than an hour on threads that are `_FASTER` times as fast, too. Whether one frame keeps a
+limit is another question: the code of a user's method cannot be counted, and `validation.study.run` times a small frame
+instead.
 """
 
 import os
@@ -17,12 +18,15 @@ import mitsuba as mi
 
 from analytic.errors import InputError
 from realtime.memory import usable_memory
+from reference.quadrature.image import light_samples_of_ray, rays_of_pixel
 
 LONGEST = 3600.0  #: seconds that a command may take at least without being forced
+_NOTED = 60.0  # seconds from which on a user would rather know before than wait
 
 _STEP = 40e-9  # of a marched ray [s]
 _RAY = 2e-6  # of any other method, by light [s]
-_REFERENCE = 100e-6  # of the quadrature, by ray [s]
+_REFERENCE = 100e-6  # of the quadrature, by ray and light at a place or in a direction [s]
+_LIGHT_SAMPLE = 10e-6  # by ray and sample of an area light: 6 to 19 in four scenes on 29 November 2026 [s]
 _SAMPLE = 1e-6  # of single-scatter and volpath [s]
 _PATH = 20e-6  # of a path through a cloud [s]
 _GPU = 100.0  # threads that a GPU replaces
@@ -37,8 +41,9 @@ _FRAME_BYTES, _REFERENCE_BYTES, _SAMPLED_BYTES = 200, 1500, 500  # by pixel
 class Work:
     """The estimated cost of some work."""
 
-    seconds: float  #: on one thread
+    seconds: float  #: on one thread; the least where errors decide how much there is to do
     memory: float = 0.0  #: at most at once [bytes]
+    most: float | None = None  #: seconds on one thread where errors ask for the most; None if that is the same
 
 
 def frame_work(size: tuple[int, int], *, lights: int = 1, steps: float = 0, frames: float = TIMED) -> Work:
@@ -47,10 +52,14 @@ def frame_work(size: tuple[int, int], *, lights: int = 1, steps: float = 0, fram
     return Work(frames * pixels * max(lights, 1) * max(steps * _STEP, _RAY), pixels * _FRAME_BYTES)
 
 
-def reference_work(size: tuple[int, int], *, lights: int = 1, images: float = 1) -> Work:
-    """Return the work of some images of the quadrature reference."""
+def reference_work(size: tuple[int, int], *, lights: int = 1, area_lights: int = 0, pixel: str = "centre") -> Work:
+    """Return the work of an image of the quadrature reference, at pixel centres or of means over areas of pixels."""
     pixels = float(size[0]) * size[1]
-    return Work(images * pixels * max(lights, 1) * _REFERENCE, pixels * _REFERENCE_BYTES)
+    least, most = (
+        pixels * rays * (max(lights, 1) * _REFERENCE + area_lights * samples * _LIGHT_SAMPLE)
+        for rays, samples in zip(rays_of_pixel(pixel), light_samples_of_ray(pixel))
+    )
+    return Work(least, pixels * _REFERENCE_BYTES, most)
 
 
 def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False) -> Work:
@@ -59,28 +68,39 @@ def sampled_work(size: tuple[int, int], samples: float, *, clouds: bool = False)
     return Work(pixels * samples * (_PATH if clouds else _SAMPLE), pixels * _SAMPLED_BYTES)
 
 
-def check_work(what: str, works: Iterable[Work]) -> None:
+def check_work(what: str, works: Iterable[Work]) -> tuple[str, ...]:
     """Refuse what would take more than an hour on any machine, or more memory than there is, unless it is forced.
 
-    `what` is asked for, as the message begins, which gives the least time, the memory and what to do.
+    `what` is asked for, as the message begins, which gives the estimated time, the memory and what to do. Returns notes
+    for the user: how long the command may take, if that is more than a minute.
     """
     works = list(works)
-    if os.environ.get("AIRLIGHT_FORCE", "0") not in ("", "0") or not works:
-        return
     threads = _GPU if (mi.variant() or "").startswith("cuda") else max(1, dr.thread_count())
-    seconds = sum(work.seconds for work in works) / (threads * _FASTER)
-    memory = max(work.memory for work in works)
+    least = sum(work.seconds for work in works) / threads
+    most = sum(work.seconds if work.most is None else work.most for work in works) / threads
+    memory = max((work.memory for work in works), default=0.0)
     usable = usable_memory()
+    forced = os.environ.get("AIRLIGHT_FORCE", "0") not in ("", "0")
     reasons = []
-    if seconds > LONGEST:
-        reasons.append(f"would take {_duration(seconds)} at least")
-    if usable is not None and memory > usable.size:
+    if least > LONGEST * _FASTER and not forced:
+        reasons.append(
+            f"would take about {_duration(least)} at the speed of one machine, and more than an hour at {_FASTER:g} "
+            "times that speed"
+        )
+    if usable is not None and memory > usable.size and not forced:
         reasons.append(f"needs about {memory / 1e9:.3g} GB of memory, of which {usable}")
     if reasons:
         raise InputError(f"{what}: {' and '.join(reasons)}; ask for less, or set AIRLIGHT_FORCE=1 to start it")
+    if most <= _NOTED:
+        return ()
+    time = f"about {_duration(most)}" if most < 1.1 * least else f"between {_duration(least)} and {_duration(most)}"
+    words = "by its rays and samples and the speed of one machine; another machine or scene may take several times that"
+    return (f"{what}: {time} {words}",)
 
 
 def _duration(seconds: float) -> str:
+    if seconds < 3600:
+        return f"{seconds:.2g} seconds" if seconds < 100 else f"{seconds / 60:.2g} minutes"
     hours = seconds / 3600
     if hours < 48:
         return f"{hours:.2g} hours"

@@ -135,10 +135,11 @@ class SceneStudy:
 
     def seconds(self) -> dict[str, float]:
         """Return roughly what each part that is not kept will take on one thread [s], by name and by label."""
-        lights = len(self.scene.lights) + 16 * len(self.scene.area_lights)
+        lights, area_lights = len(self.scene.lights), len(self.scene.area_lights)
         checks, parts = self.study.checks, dict[str, float]()
         known = is_kept(self.reference_inputs.key)
-        parts["reference"] = 0.0 if known else reference_work(self.size, lights=lights).seconds
+        work = reference_work(self.size, lights=lights, area_lights=area_lights)
+        parts["reference"] = 0.0 if known else work.seconds
         with self.at(checks.size) as scene:
             known = is_kept(CheckInputs(scene_content(scene), checks, self.study.points).key)
         parts["checks"] = 0.0 if known else len(checks.margins) * (checks.patience or 60.0)

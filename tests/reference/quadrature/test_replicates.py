@@ -73,6 +73,24 @@ def test_points_follow_the_error_that_is_asked_for():
         assert (standard_error(means)[:3] <= error * means.mean(axis=2)[:3]).all()
 
 
+@pytest.mark.parametrize("plan", [PointPlan(), PointPlan(first=4, most=128), PointPlan(error=0.0, first=4, most=4)])
+def test_the_least_and_the_most_points_are_those_that_rays_take(plan):
+    """The first ray's replicates agree at once; the second's differ by what never reaches the error."""
+    taken = np.zeros(2, dtype=int)
+    rough = np.array([0.0, 1.0])
+
+    def sums(part, chosen, active):
+        taken[active] += REPLICATES * chosen.most
+        spread = np.linspace(-0.5, 0.5, REPLICATES) * rough[active, None, None]
+        return np.repeat(chosen.most * (1.0 + spread), 3, axis=1)
+
+    replicate_means(2, np.zeros((2, 3)), plan, sums)
+    assert taken[0] == plan.points[0]
+    # A ray that cannot reach its error is given all points by its first pilot, or goes through all of them.
+    assert plan.points[0] <= taken[1] <= plan.points[1]
+    assert taken[1] >= REPLICATES * plan.most
+
+
 RUNS = 400
 
 

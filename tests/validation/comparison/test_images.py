@@ -78,7 +78,7 @@ def test_stated_errors_of_both_files_count_in_the_verdict_on_a_margin():
     assert compare_images(*files, margin=0.026).failures == ()
     words = "the relative bias is not shown to be within +-0.025"
     assert compare_images(*files, margin=0.025).failures == (words,)
-    # Beside noise of 0.1 % a pixel, 0.006 % of the image, the same bound counts on both sides of the interval.
+    # With noise of 0.1 % a pixel, 0.006 % of the image, the same bound counts on both sides of the interval.
     noisy = bounded(test, np.full(SHAPE, 0.01), "estimated", airlight_se=0.001 * test)
     assert compare_images(files[0], noisy, margin=0.027).failures == ()
     assert compare_images(files[0], noisy, margin=0.025).failures == (words,)

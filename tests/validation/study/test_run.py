@@ -21,7 +21,7 @@ from validation.study import cost as expected_work
 from validation.study import reference as sampled
 from validation.study import run as module
 from validation.study.configuration import STANDARD, Configuration, configuration, prepared
-from validation.study.cost import Work, check_work
+from validation.study.cost import Work, check_work, reference_work
 from validation.study.reference import cell_reference, load_cell
 from validation.study.row import row_values
 from validation.study.run import run
@@ -212,16 +212,32 @@ def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):
     monkeypatch.setattr(expected_work.mi, "variant", lambda: "llvm_ad_rgb")
     check_work("x", [Work(36000, 1e9), Work(36000, 1e9)])  # an hour if two threads are ten times as fast
     with pytest.raises(
-        InputError, match=r"^x: would take 1 hours at least; ask for less, or set AIRLIGHT_FORCE=1 to start it"
+        InputError,
+        match=r"^x: would take about 10 hours at the speed of one machine, and more than an hour at 10 times that "
+        r"speed; ask for less, or set AIRLIGHT_FORCE=1 to start it",
     ):
         check_work("x", [Work(37000), Work(36000)])
     with pytest.raises(InputError, match=r"^x: needs about 2 GB of memory, of which this machine has 1 GB; ask"):
         check_work("x", [Work(1, 2e9)])
-    with pytest.raises(InputError, match=r"take 6\.[0-9]* years at least and needs"):
+    with pytest.raises(InputError, match=r"about 63\.[0-9]* years at .* speed and needs"):
         check_work("x", [Work(4e9, 2e9)])
-    check_work("x", [])
+    assert check_work("x", []) == ()
     monkeypatch.setenv("AIRLIGHT_FORCE", "1")
     check_work("x", [Work(1e10, 2e9)])
+
+
+def test_a_user_is_told_before_a_command_runs_for_minutes(variant, monkeypatch):
+    """Means over pixels take 48 to 1360 rays beside the centre's, each with 32 samples of every area light."""
+    monkeypatch.setattr(expected_work.dr, "thread_count", lambda: 2)
+    size, scale = (160, 120), 160 * 120 / 2
+    assert check_work("x", [reference_work(size)]) == ()
+    (words,) = check_work("x", [reference_work(size, pixel="area")])
+    least, most = 49 * 100e-6 * scale, 1361 * 100e-6 * scale
+    assert words.startswith(f"x: between {least:.2g} seconds and {most / 60:.2g} minutes by its rays and samples")
+    of_lights = reference_work(size, lights=0, area_lights=2, pixel="area")
+    assert of_lights.seconds == pytest.approx(49 * (100e-6 + 2 * 32 * 10e-6) * 2 * scale)
+    # A time without a range is one number.
+    assert check_work("x", [Work(600.0)])[0].startswith("x: about 5 minutes by its rays")
 
 
 @pytest.mark.parametrize(
