@@ -76,9 +76,9 @@ class Diagnosis:
     ranked: tuple[Ranked, ...]  #: one where no fault was looked for
     residual: float  #: mean relative error of the image as it is
     left: float  #: what the first explanation leaves of it
-    rest: str  #: what that is: noise, or little; empty where it is neither
+    rest: str  #: what that is: like noise, or little; empty where it is neither
     explained: bool  #: whether that is nothing to explain
-    place: str  #: where the remaining error lies; empty where it is noise, or little
+    place: str  #: where the remaining error lies; empty where it is like noise, or little
     few: str  #: which pixels are wrong where these are few and all others are right; empty otherwise
     verdict: str  #: of the comparison with the reference, in words
     failures: tuple[str, ...] = ()  #: what is wrong with the file, such as pixels that are not finite
@@ -106,7 +106,7 @@ class Diagnosis:
         if self.first == RIGHT and len(self.ranked) < 2:
             return [f"Nothing is wrong with it: {self.verdict}."]
         if self.first == RIGHT:
-            return [f"No fault is found, and the difference is {self.rest}: render more samples ({self.verdict})."]
+            return [f"No fault is found, and the difference is {self.rest} ({self.verdict})."]
         if self.first == BLACK:
             return [f"The image is black: {self.verdict}."]
         if self.first == UNEXPLAINED:
@@ -315,7 +315,7 @@ class _Attempt:
     def rest(self, explanation: Explanation) -> str:
         """Return what an explanation leaves in words; nothing where something else is wrong too."""
         if self.blocks.is_noise(explanation):
-            return "noise: neighbouring pixels do not share it"
+            return "like noise: neighbouring pixels do not share it"
         return "little" if self._is_little(explanation) else ""
 
     @property

@@ -97,7 +97,8 @@ class Verdict:
         if not self.right:
             return f"not right: {'; '.join(self.reasons)}"
         size = "single pixels" if self.block == 1 else f"means over {self.block} x {self.block} pixels"
-        return f"right: {size} are within {100 * self.block_error:.2g} % (noise {100 * self.block_noise:.2g} %)"
+        scatter = f"the scatter of single pixels alone makes {100 * self.block_noise:.2g} %"
+        return f"right: {size} are within {100 * self.block_error:.2g} % ({scatter})"
 
 
 @dataclass(frozen=True)
@@ -341,7 +342,8 @@ def judge(reference: Array, image: Array, hints: Hints, failures: Sequence[str])
         reasons.append("nothing is lit in the pixels that are compared")
     if error > RIGHT:
         size = "single pixels" if side == 1 else f"means over {side} x {side} pixels"
-        most = ", most of it noise: render more samples" if noise > error / math.sqrt(2) else ""
+        scatter = ", most of it scatter of single pixels: render more samples, or march more steps"
+        most = scatter if noise > error / math.sqrt(2) else ""
         reasons.append(f"{size} are {100 * error:.3g} % off{most}")
     return Verdict(not reasons, tuple(reasons), side, error, noise)
 

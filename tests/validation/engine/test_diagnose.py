@@ -243,8 +243,8 @@ def test_the_fog_alone_is_too_bright(scenes):
     injected, said = named(scenes, 2)
     assert said.first == injected == "fog-factor"
     assert said.ranked[0].parameters[0] == pytest.approx(8.3, rel=1e-2)
-    assert said.rest.startswith("noise")
-    assert "which is noise" in "\n".join(said.lines)
+    assert said.rest.startswith("like noise")
+    assert "which is like noise" in "\n".join(said.lines)
 
 
 @pytest.mark.claim("diagnosis-injected")

@@ -269,11 +269,11 @@ def test_noise_of_pixels_is_told_from_an_error_of_blocks():
     assert verdict.right
     np.testing.assert_allclose([verdict.block_error, verdict.block_noise], 0.04 / 8, rtol=0.05)
     noisy = judge(expected, expected + 4 * (image - expected), find_hints(expected, image), ())
-    assert "most of it noise: render more samples" in noisy.words
+    assert "most of it scatter of single pixels" in noisy.words
     image[40:80, 40:80] *= 0.9
     verdict = judge(expected, image, find_hints(expected, image), ())
     assert "means over 8 x 8 pixels are" in verdict.words
-    assert "noise" not in verdict.words
+    assert "scatter" not in verdict.words
     assert not judge(expected, expected, find_hints(expected, expected), ("2 pixels are negative",)).right
     assert judge(expected, expected, find_hints(expected, expected), ()).right
     dark = judge(0 * expected, 0 * expected, find_hints(expected, expected), ())
