@@ -120,11 +120,14 @@ class Doctor(Result):
         return [*lines, ready if self.works else f"Not ready: {self.machine.problem}"]
 
     @property
+    def passed(self) -> bool:
+        """Whether kernels run here, and no file is left of a cache that was to be cleared."""
+        return self.works and (self.cache.removed is None or self.cache.files == 0)
+
+    @property
     def status(self) -> int:
         """The exit status: 3 where no kernel can be run, 1 where the cache was to be cleared and files are left."""
-        if not self.works:
-            return 3
-        return int(self.cache.removed is not None and self.cache.files > 0)
+        return super().status if self.works else 3
 
     @property
     def title(self) -> str:

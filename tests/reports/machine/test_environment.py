@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -190,7 +191,11 @@ def test_the_cache_is_shown_and_cleared(filled, monkeypatch):
     cleared = doctor.doctor(clear_cache=True)
     assert (cleared.cache.removed, cleared.cache.freed, cleared.cache.files) == (6, size, 0)
     assert not list(filled.rglob("*.npz"))
-    assert cleared.status == 0
+    assert (cleared.passed, cleared.status) == (True, 0)
+    left = replace(cleared, cache=replace(cleared.cache, files=1))
+    assert (left.passed, left.status) == (False, 1)
+    broken = replace(cleared, machine=doctor.Machine(False, "no libLLVM", None, None, ()))
+    assert (broken.passed, broken.status) == (False, 3)
 
 
 @linux
