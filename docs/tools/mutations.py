@@ -121,7 +121,8 @@ def covering_tests(rooms: Sequence[str], folder: Path) -> tuple[dict[tuple[str, 
     if not (folder / "tests.xml").exists():
         folder.mkdir(parents=True, exist_ok=True)
         measured = [f"--cov={room}" for room in rooms]
-        options = ["--cov-context=test", "--cov-report=", f"--junit-xml={folder.resolve()}/tests.xml"]
+        options = ["--cov-context=test", "--cov-report=", "--cov-fail-under=0"]
+        options.append(f"--junit-xml={folder.resolve()}/tests.xml")
         where = os.environ | {"COVERAGE_FILE": str(folder.resolve() / "coverage")}
         subprocess.run([ROOT / "airlight", "test", "-q", *measured, *options], cwd=ROOT, env=where, check=True)
     took: dict[str, float] = {}

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A result shows the same on a terminal, in a notebook and as JSON; no JSON has a number that is not finite."""
 
+import io
 import json
+import sys
 
 import pytest
 
@@ -42,6 +44,15 @@ def test_a_number_that_is_not_finite_is_refused_rather_than_printed_as_no_json(v
     assert capsys.readouterr().out == ""
     print_json({"value": None, "name": "\N{GREEK SMALL LETTER SIGMA}"})
     assert json.loads(capsys.readouterr().out) == {"value": None, "name": "\N{GREEK SMALL LETTER SIGMA}"}
+
+
+def test_json_on_an_output_of_ascii_has_every_letter_in_ascii(monkeypatch):
+    written = io.BytesIO()
+    with io.TextIOWrapper(written, encoding="ascii") as output:
+        monkeypatch.setattr(sys, "stdout", output)
+        print_json({"name": "\N{GREEK SMALL LETTER SIGMA}"})
+        output.flush()
+        assert json.loads(written.getvalue().decode("ascii")) == {"name": "\N{GREEK SMALL LETTER SIGMA}"}
 
 
 @pytest.mark.parametrize(("width", "shown"), [(6, 240), (100, 300), (240, 240), (320, 320)])
