@@ -107,7 +107,7 @@ def test_a_folder_that_was_deleted_is_said_before_any_work(tmp_path, monkeypatch
 
 @pytest.mark.parametrize(("closed", "status"), [(True, 1), (False, 2)], ids=["reader left", "disk full"])
 def test_an_output_that_cannot_be_written_is_written_no_more(closed, status, monkeypatch, capsys):
-    """What is still in the buffer would fail when Python ends."""
+    """Text that is still in the buffer would fail when Python ends."""
     if closed:
         read, write = os.pipe()
         os.close(read)

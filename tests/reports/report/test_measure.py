@@ -299,7 +299,7 @@ def test_the_device_of_shaders_is_part_of_the_machine(variant, tmp_path, monkeyp
         assert report.environment.opengl == device
 
 
-# What belongs to no scene
+# Parts that belong to no scene
 
 
 def test_stability_and_growth_have_their_records_their_time_and_are_kept(written, variant, tmp_path, monkeypatch):
