@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from reports.data.records import Report, Size
 from reports.tables.methods import runs_of
-from validation.statistics.noise import SHORTEST, Times, drift, least_ratio, slower_stages, spread
+from validation.statistics.noise import SHORTEST, Times, drift, growths, least_ratio, slower_stages, spread
 from validation.timing import FrameTimes
 
 
@@ -50,8 +50,14 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> tuple
     least = least_ratio(both, same_machine=machine, tolerance=tolerance)
     common = drift(pairs.values()) if pairs else 1.0
     findings = [*notes, *_drift(common, least, machine, len(pairs))]
-    for (scene, label), (old_times, new_times) in pairs.items():
-        findings += _configuration(scene, label, old_times, new_times, least=least, common=common, machine=machine)
+    grown = {key: growths(*times, common) for key, times in pairs.items()}
+    for key, times in pairs.items():
+        # What other configurations say of noise: a change of this one must not pass for it.
+        others = [growth for other, several in grown.items() if other != key for growth in several]
+        tests = 2 * (len(others) + len(grown[key]))  # in both directions
+        findings += _configuration(
+            *key, *times, least=least, common=common, machine=machine, others=others, tests=tests
+        )
     return TimeComparison(len(pairs), machine, changes, both, least, common), findings
 
 
@@ -128,12 +134,21 @@ def _drift(common: float, least: float, machine: bool, count: int) -> list[Findi
 
 
 def _configuration(
-    scene: str, label: str, old: Times, new: Times, *, least: float, common: float, machine: bool
+    scene: str,
+    label: str,
+    old: Times,
+    new: Times,
+    *,
+    least: float,
+    common: float,
+    machine: bool,
+    others: list[float],
+    tests: int,
 ) -> list[Finding]:
     """Return the stages of one configuration that got slower or faster."""
     floor = 1.0 if machine else 0.0
-    slower = slower_stages(old, new, least=least, scale=max(floor, common))
-    faster = slower_stages(new, old, least=least, scale=max(floor, 1 / common))
+    slower = slower_stages(old, new, least=least, scale=max(floor, common), others=others, tests=tests)
+    faster = slower_stages(new, old, least=least, scale=max(floor, 1 / common), others=others, tests=tests)
     moved = [("worse", stage) for stage in slower] + [("better", stage) for stage in faster]
     beside = "" if machine else f", beside the median of all ({common:.2f} times)"
     return [

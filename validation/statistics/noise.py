@@ -26,7 +26,7 @@ A count of negative pixels may move by the band and a thousandth of the image (s
 sign); a count of pixels that are not finite may not move at all.
 
 **Times.** A timing is a median with its quartiles. Whatever else a machine does only adds time, in bursts that last
-longer than a repetition; so the quartiles say how noisy the moment was, not how far the next run will be. Three rules:
+longer than a repetition; so the quartiles say how noisy the moment was, not how far the next run will be. Four rules:
 
 1. *Spread.* The geometric mean of upper over lower quartile, over all timings of a report, says how busy the machine
    was: 1.01 to 1.05 in seven reports on a quiet machine, 1.7 to 3.1 in five on the same machine when it was shared. A
@@ -36,11 +36,21 @@ longer than a repetition; so the quartiles say how noisy the moment was, not how
    method is slower only if it is slower as measured and beside this. The drift itself is judged by rule 1, once.
    Between two machines only what is left beside the drift is compared, with four times the tolerance: methods do not
    profit alike from wider vectors, larger caches or more threads.
-3. *Witnesses.* The stages were timed one after the other, and each is part of others: surface and airlight of the
-   frame, the frame of one after the light moved, that of one after objects moved. Work that grew is seen in them too, a
-   burst is not: every stage that contains it must have grown by half as many milliseconds, and the quartiles must not
-   overlap. Two bursts do meet now and then: with a single witness the square of the ratio is needed, without one the
-   cube, and the square where there are too few repetitions for quartiles. The surface alone is no concern of a method.
+3. *Witnesses.* Each stage has timings of its own, and is part of others: surface and airlight of the frame, the frame
+   of one after the light moved, that of one after objects moved. Work that grew is seen in them too, a burst is not:
+   every stage that contains it must have grown by half as many milliseconds. The surface alone is no concern of a
+   method.
+4. *Chance.* If a burst multiplies a time by exp(E), E exponential with the mean tau, the logarithm of the ratio of two
+   times of the same work is the difference of two such E: U has Laplace's law, P(U > u) = exp(-u/tau)/2 for u > 0. All
+   |U| of the n timings of other configurations are exponential, and their mean is tau to 1/sqrt(n). The quotient
+   x = u/mean then has Pareto's law, and the chance of such a growth or more is
+
+       p = (1 + x/n)^-n / 2  for x > 0,        1 - (1 - x/n)^-n / 2  below.
+
+   A stage and its witnesses are k timings that grow by chance independently of each other. By Fisher's method the sum
+   of their -ln p has the law of Gamma(k), if n is large; that is the test statistic. A stage is slower if so large a
+   sum has less than the chance sidak(LEVEL, tests), for as many tests as there are stages, configurations and
+   directions: all of a comparison of the same code together give an alarm with the chance LEVEL. A test simulates it.
 
 **Powers** of the work with which times grow, fitted to a few steps. Another power is one that differs by more than
 three standard errors of both fits, and by more than `POWER_TOLERANCE`: over the eight times the work of the shortest
@@ -48,12 +58,14 @@ ladder, that is a time at one end that is wrong by half.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from validation.statistics.comparison import LEVEL
 from validation.statistics.estimate import Answer, Estimate
+from validation.statistics.samples import sidak
 
 ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
 ERROR_TOLERANCE = 0.02  #: relative band of an error
@@ -127,11 +139,40 @@ def least_ratio(spread_of_both: float, *, same_machine: bool, tolerance: float =
     return (1 + tolerance * (1 if same_machine else 4)) * spread_of_both
 
 
-def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list[str]:
+def growths(old: Times, new: Times, scale: float) -> list[float]:
+    """Return the logarithms of the ratios of new to old times of the stages of a frame [1], beside a common `scale`."""
+    was, now = _medians(old), _medians(new)
+    return [_growth(was[stage], now[stage] / scale) for stage in _WITNESSES if stage in was and stage in now]
+
+
+def _growth(was: float, now: float) -> float:
+    """Return the logarithm of the ratio of two times [ms]; what is too short to mean something has not changed."""
+    return math.log(max(now, SHORTEST) / max(was, SHORTEST))
+
+
+def chance(of: Sequence[float], others: Sequence[float]) -> float:
+    """Return the chance that times of the same work grow together as much as these, or more, see the module.
+
+    `of`, `others`: logarithms of ratios [1], of independent times and of times of other configurations.
+    """
+    n = len(others)
+    if n == 0:
+        return 1.0
+    mean = float(np.mean(np.abs(others)))
+    tiny = float(np.finfo(float).tiny)
+    tails = [0.5 * math.exp(-n * math.log1p(abs(growth) / (n * mean + tiny))) for growth in of]
+    total = -sum(math.log(max(tail if growth > 0 else 1 - tail, tiny)) for growth, tail in zip(of, tails))
+    return math.exp(-total) * sum(total**k / math.factorial(k) for k in range(len(of)))
+
+
+def slower_stages(
+    old: Times, new: Times, *, least: float, scale: float, others: Sequence[float], tests: int
+) -> list[str]:
     """Return the stages of a frame that got slower.
 
     Ratios of times mean something from `least` on, see `least_ratio`; `scale` is how much slower than before everything
-    else is [1], at least 1 on the same machine. Faster stages are those that get slower from new to old.
+    else is [1], at least 1 on the same machine; `others` are the `growths` of other configurations, and `tests` how
+    many stages are tested in all. Faster stages are those that get slower from new to old.
     """
     shared = [stage for stage in old if stage in new]
     before, after = ({stage: times[stage] for stage in shared} for times in (old, new))
@@ -139,14 +180,11 @@ def slower_stages(old: Times, new: Times, *, least: float, scale: float) -> list
     slow = []
     for stage in (each for each in shared if each in _WITNESSES):
         growth = now[stage] - was[stage]
-        witnesses = [now[name] - was[name] for name in _WITNESSES[stage] if name in was]
-        power = max(1, 3 - len(witnesses))
-        if min(before[stage].repetitions, after[stage].repetitions) < _FEW:
-            power = max(2, power)
-        longer = growth >= SHORTEST and now[stage] >= least**power * was[stage]
-        apart = after[stage].low_ms / scale > before[stage].high_ms
-        if longer and apart and all(witness >= 0.5 * growth for witness in witnesses):
-            slow.append(stage)
+        witnesses = [name for name in _WITNESSES[stage] if name in was]
+        longer = growth >= SHORTEST and now[stage] >= least * was[stage]
+        if longer and all(now[name] - was[name] >= 0.5 * growth for name in witnesses):
+            timings = [_growth(was[name], now[name]) for name in (stage, *witnesses)]
+            slow += [stage] if chance(timings, others) < sidak(LEVEL, tests) else []
     return slow
 
 

@@ -9,8 +9,12 @@ from scipy import stats
 
 from tests.helpers.calibration import power
 from tests.helpers.reports import record_of, sampled, times
+from validation.statistics.comparison import LEVEL
 from validation.statistics.estimate import Answer
 from validation.statistics.noise import (
+    chance,
+    drift,
+    growths,
     other_power,
     slower_stages,
     spread,
@@ -132,9 +136,51 @@ def test_more_work_is_seen_in_all_that_contains_it():
     old, new = (record_of(times(1.0), FrameTimes).measured for _ in range(2))
     for stage in ("airlight", "frame", "light_moved", "objects_moved"):
         new[stage] = record_of(sampled([old[stage].median_ms + 0.7] * 20), Timing)
-    assert slower_stages(old, new, least=1.25, scale=1.0) == ["airlight", "frame"]
-    assert slower_stages(old, new, least=1.1, scale=1.0) == ["airlight", "frame", "light_moved", "objects_moved"]
-    assert slower_stages(new, old, least=1.1, scale=1.0) == []
+    quiet, busy = [0.01, -0.01] * 20, [0.4, -0.4] * 20
+    stages = ["airlight", "frame", "light_moved", "objects_moved"]
+    assert slower_stages(old, new, least=1.1, scale=1.0, others=quiet, tests=80) == stages
+    assert slower_stages(old, new, least=1.4, scale=1.0, others=quiet, tests=80) == stages[:3]
+    assert slower_stages(new, old, least=1.1, scale=1.0, others=quiet, tests=80) == []
+    # Where other times grow and fall as much, and where there are no others, it may be chance.
+    assert slower_stages(old, new, least=1.1, scale=1.0, others=busy, tests=80) == []
+    assert slower_stages(old, new, least=1.1, scale=1.0, others=[], tests=8) == []
+
+
+def test_the_chance_of_a_growth_by_hand():
+    """One time: half of Pareto's tail. Two that grow alike: Fisher's (1 - ln p^2) p^2. One that falls: above a half."""
+    others = [0.1, -0.1, 0.2, 0.0]  # of the mean 0.1
+    p = 0.5 * (1 + 3 / 4) ** -4
+    assert chance([0.3], others) == pytest.approx(p)
+    assert chance([0.3, 0.3], others) == pytest.approx(p**2 * (1 - 2 * np.log(p)))
+    assert chance([-0.3], others) == pytest.approx(1 - p)
+    assert chance([0.3], [0.0, 0.0]) < 1e-200
+    assert chance([0.3], []) == 1.0
+
+
+@pytest.mark.parametrize(("spread", "configurations"), [(0.05, 4), (0.5, 4), (0.5, 12)])
+def test_the_same_code_gives_alarms_as_often_as_the_level_says(spread, configurations):
+    """Bursts multiply whole timings by exp(E), E exponential: the law of rule 4."""
+    random, runs, stages = np.random.default_rng(configurations), 200, times(1.0)
+    stages = {stage: stages[stage]["median_ms"] for stage in ("surface", "airlight", "frame", "light_moved")}
+    alarms = 0
+    for _ in range(runs):
+        pairs = [
+            [{stage: timing(ms * np.exp(random.exponential(spread))) for stage, ms in stages.items()} for _ in range(2)]
+            for _ in range(configurations)
+        ]
+        common = drift(pairs)
+        grown = [growths(old, new, common) for old, new in pairs]
+        for number, (old, new) in enumerate(pairs):
+            others = [growth for place, several in enumerate(grown) if place != number for growth in several]
+            how = {"least": 1.0, "others": others, "tests": 2 * 3 * configurations}
+            slow = slower_stages(old, new, scale=common, **how) + slower_stages(new, old, scale=1 / common, **how)
+            alarms += len(slow) > 0
+    # Four standard errors of so many runs.
+    assert alarms / runs < LEVEL + 4 * np.sqrt(LEVEL / runs)
+
+
+def timing(ms):
+    return Timing(median_ms=ms, low_ms=ms, high_ms=ms, repetitions=20)
 
 
 @pytest.mark.parametrize(
