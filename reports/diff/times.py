@@ -52,7 +52,7 @@ def compare_times(old: Report, new: Report, *, tolerance: float | None) -> tuple
     findings = [*notes, *_drift(common, least, machine, len(pairs))]
     grown = {key: growths(*times, common) for key, times in pairs.items()}
     for key, times in pairs.items():
-        # What other configurations say of noise: a change of this one must not pass for it.
+        # Other configurations tell the noise: a change of this one must not pass for it.
         others = [growth for other, several in grown.items() if other != key for growth in several]
         tests = 2 * (len(others) + len(grown[key]))  # in both directions
         findings += _configuration(
