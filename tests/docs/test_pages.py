@@ -32,6 +32,7 @@ class Loaded(HTMLParser):
             self.resources += [values[name] for name in addresses if name in values]
 
 
+@pytest.mark.slow
 @pytest.mark.claim("docs-without-a-network")
 def test_pages_build_and_load_nothing_from_a_network(tmp_path):
     """Sphinx checks links, names of functions, formulas, and that each claim has a test."""

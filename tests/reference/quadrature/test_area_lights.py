@@ -241,7 +241,9 @@ def test_what_is_within_a_sphere_hides_nothing(variant):
     assert filled == pytest.approx(alone, rel=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["mesh", "rectangle", "sphere", pytest.param("disk", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "kind", ["rectangle", "sphere", *(pytest.param(each, marks=pytest.mark.slow) for each in ("mesh", "disk"))]
+)
 def test_surfaces_by_many_shadow_rays(variant, kind):
     """Samples in the solid angle against even points of the light, each seen or not along one float64 ray."""
     reference = room((LAMPS | MESH)[kind](), size=(8, 6))

@@ -68,6 +68,7 @@ def test_another_fog_is_found_from_any_start(variant, tmp_path, start):
     assert fit.explained > 0.999999
 
 
+@pytest.mark.slow
 @pytest.mark.claim("fit-height-fog")
 def test_heights_of_a_layer_are_found_in_an_image_by_other_code(variant, tmp_path):
     """NumPy makes the image: no code of it is the fog model's."""
