@@ -35,9 +35,14 @@ class Column:
     kind: str  #: 'string', 'int64', 'float64', 'bool' or 'binary', as Arrow names them
 
 
-def column(heading: str = "", unit: str | None = None, meaning: str = "", *, default: Any = MISSING) -> Any:
-    """Return a field of a data class with its heading (its name with spaces by default), its unit and its meaning."""
-    return field(default=default, metadata={_COLUMN: (heading, unit, meaning)})
+def column(
+    heading: str = "", unit: str | None = None, meaning: str = "", *, default: Any = MISSING, factory: Any = MISSING
+) -> Any:
+    """Return a field of a data class with its heading (its name with spaces by default), its unit and its meaning.
+
+    Its `default`, or what the `factory` makes, is the value where none is given.
+    """
+    return field(default=default, default_factory=factory, metadata={_COLUMN: (heading, unit, meaning)})
 
 
 @cache

@@ -82,7 +82,7 @@ def kept_of_report(report: dict[str, Any]) -> dict[str, Any]:
             "created": report["created"],
             "command": report["command"],
             "effort": report["settings"]["name"],
-            "timed": report["settings"]["timed"],
+            "timed": report["settings"]["measure"]["timed_size"] or report["settings"]["sizes"][0],
             "processor": environment["processor"],
             "threads": environment["threads"],
             "variant": environment["variant"],

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path, PureWindowsPath
-from typing import Any, Literal, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from analytic.errors import InputError
 from validation.columns import column, described, record_of
@@ -19,11 +19,11 @@ from validation.kernels.records import Stability
 from validation.papers.claims import Claim as PaperClaim
 from validation.statistics.records import Agreement, MultipleScattering, Number
 from validation.study.row import Row
+from validation.study.settings import Settings, Size
 from validation.timing import Scaling
 
 SCHEMA = "airlight-report/4"
 
-Size = tuple[int, int]  #: width and height [pixels]
 Files = Mapping[str, str]  #: names relative to the folder of the report, by what they are
 
 
@@ -33,28 +33,6 @@ class Measured:
 
     first: str
     last: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """The settings of the study."""
-
-    name: str = column(meaning="`quick`, `default`, `full`, or the name of a user's study")
-    scenes: tuple[str, ...] = column(meaning="the scenes of the report")
-    image: Size = column(unit="pixels", meaning="width and height of the images")
-    timed: Size = column(unit="pixels", meaning="of the frames that are timed")
-    checked: Size = column(unit="pixels", meaning="of the checks of the reference")
-    margins: Mapping[str, float] = column(meaning="by estimator, the relative bias that counts as agreement")
-    samples: int | Mapping[str, int] = column(meaning="of the checks, by estimator: samples per pixel in a batch")
-    batches: int = column(meaning="of the checks: largest number of batches")
-    multiple: tuple[int, int] = column(meaning="of multiple scattering: batches, and samples per pixel in each")
-    patience: Number = column(unit="s", meaning="after which an undecided estimator is stopped; `null`: never")
-    seconds: float = column(unit="s", meaning="for each timing")
-    slow: Number = column(unit="s", meaning="a frame that takes longer, preparation included, is timed by stages")
-    limit: Number = column(unit="s", meaning="frames that would take longer are not measured; `null`: none")
-    flip: Literal["none", "kinds", "all"] = column(meaning="which get HDR-FLIP; `kinds`: those of `--quick`")
-    rays: int = column(meaning="generated rays for the stability of the kernels; 0: none")
-    scaling: tuple[str, ...] = column(meaning="the kinds of work by whose growth `colonnade` is timed", default=())
 
 
 @dataclass(frozen=True, kw_only=True)

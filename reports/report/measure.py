@@ -28,7 +28,6 @@ from reports.data.records import (
     Environment,
     Measured,
     Report,
-    Settings,
     load_report,
     named_files,
     report_text,
@@ -159,7 +158,7 @@ def write_report(
             cached=kept,
             computed=len(results) - kept,
             measured=Measured(first=date(made[0]), last=date(made[-1])) if made else None,
-            settings=settings(study),
+            settings=study.settings,
             environment=record_of(environment, Environment),
             claims=(*claims(studied), *growth_claims(scaling), *(unstudied(names, list(FOG_SCENES)) if usual else [])),
             scenes=tuple(studied),
@@ -172,24 +171,6 @@ def write_report(
         (hidden / "report.html").write_text(render_page(report, hidden), encoding="utf-8", newline="\n")
     page(1.0, "done")
     return report
-
-
-def settings(study: Study) -> Settings:
-    """Return the settings of a study."""
-    measure, checks = study.measure, study.checks
-    asked = {
-        **vars(checks),
-        **vars(measure),
-        "name": study.name,
-        "scenes": tuple(study.scene_names()),
-        "image": study.sizes[0],
-        "timed": measure.timed_size or study.sizes[0],
-        "checked": checks.size,
-        "flip": study.flip,
-        "rays": study.stability,
-        "scaling": study.growth,
-    }
-    return record_of(asked, Settings)
 
 
 def _begins(progress: Progress, seconds: Mapping[str, float]) -> Callable[[str], None]:

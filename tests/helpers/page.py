@@ -95,7 +95,7 @@ DATA: dict[str, Any] = report_of(
     command="airlight report --quick",
     seconds=12.3,
     computed=9,
-    settings=settings(image=[WIDTH, HEIGHT], timed=[64, 48]),
+    settings=settings(sizes=[[WIDTH, HEIGHT]], measure={"timed_size": [64, 48]}),
     claims=[
         {"kind": "reference", "text": "The reference is confirmed.", "good": True},
         {"kind": "left-out", "text": "Every method here scatters once.", "good": None},

@@ -141,9 +141,11 @@ def scene(name: str, methods: list[dict[str, Any]], **changes: Any) -> dict[str,
 
 def settings(**changes: Any) -> dict[str, Any]:
     """Return an effort."""
-    made = {"name": "quick", "scenes": [], "image": [320, 240], "timed": [320, 240], "checked": [64, 48]}
-    made |= {"margins": {"volpath": 0.01}, "seconds": 0.1, "samples": 4, "batches": 8, "multiple": [4, 1]}
-    return made | {"patience": 1.0, "slow": 1.0, "limit": 1.0, "flip": "none", "rays": 0} | changes
+    measure = {"times": "stages", "seconds": 0.1, "timed_size": [320, 240], "slow": 1.0, "limit": 1.0}
+    checks = {"size": [64, 48], "margins": {"volpath": 0.01}, "samples": {"volpath": 4}, "batches": 8}
+    checks |= {"multiple": [4, 1], "patience": 1.0}
+    made = {"name": "quick", "scenes": [], "sizes": [[320, 240]], "measure": measure, "checks": checks}
+    return made | {"flip": "none", "stability": 0} | changes
 
 
 def environment(**changes: Any) -> dict[str, Any]:

@@ -6,6 +6,7 @@ A *study* says which scenes, methods and sizes; a *cell* is one combination of t
 Read in this order:
 
 - `configuration.py`: a method with its kernel and parameters, by the names that a user gives;
+- `settings.py`: what a study asks for, as its file and a report have it;
 - `study.py`: a study from its TOML file, and its cells; those of ours are in `studies/`;
 - `row.py`: what comes of a cell: the columns of a row, with unit and meaning;
 - `frame_times.py`: a turn of a method: the times of a frame and of its stages;

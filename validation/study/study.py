@@ -29,7 +29,7 @@ before any work. The measurements of a report are a study too (`validation/study
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -62,12 +62,11 @@ from validation.study.configuration import (
     find_kernel,
     named_configurations,
 )
+from validation.study.settings import Checks, Measure, Settings
 
 #: How frames are timed: 'none'; 'with' the computation of errors, briefly, whatever else runs on the host; 'alone',
 #: where nothing else of the study runs there; 'stages': all stages, and frames after light, objects or colours changed.
 TIMES = ("none", "with", "alone", "stages")
-
-SIZE = (160, 120)  #: of the images where a study gives none [pixels]
 
 #: The studies of reports, and the kinds of work by which times may grow.
 STUDIES = ("quick", "default", "full")
@@ -82,19 +81,6 @@ _MOST_SCENES = 10_000_000
 
 
 @dataclass(frozen=True)
-class Measure:
-    """The measurements of a cell besides its errors."""
-
-    times: str = "with"  #: one of `TIMES`
-    seconds: float = 0.6  #: spent on each of the times of 'stages'
-    timed_size: tuple[int, int] | None = None  #: of the frames that are timed by stages [pixels]; None: of the image
-    slow: float | None = None  #: see `validation.study.turns.time_alone` [s]
-    limit: float | None = None  #: a cell is left out if a frame would take longer [s]; None: never
-    flip: bool = False  #: HDR-FLIP, which takes about a second
-    every_metric: bool = True  #: those of other tools, colours, and the error that a method states for itself
-
-
-@dataclass(frozen=True)
 class Cell:
     """One combination of a study: what becomes one row."""
 
@@ -102,7 +88,7 @@ class Cell:
     size: tuple[int, int]  #: width and height [pixels]
     medium: tuple[str, ...]  #: changes of the medium, as `parse_changes` reads them
     chosen: Configuration
-    measure: Measure = Measure()
+    measure: Measure = field(default_factory=Measure)
     work: tuple[str, float] | None = None  #: kind and amount, of a step of `validation.study.growth`
 
     @property
@@ -121,37 +107,23 @@ class RandomScenes:
 
 
 @dataclass(frozen=True)
-class Checks:
-    """How the references of a study are held against Monte Carlo estimators."""
-
-    size: tuple[int, int] = (64, 48)  #: of the images [pixels]
-    margins: Mapping[str, float] = field(default_factory=lambda: {"single-scatter": 0.0005, "volpath": 0.01})
-    samples: Mapping[str, int] = field(default_factory=lambda: {"single-scatter": 128, "volpath": 16})
-    batches: int = 2048  #: largest number of batches
-    multiple: tuple[int, int] = (8, 4)  #: batches, and samples a pixel in each, for the fraction of multiple scattering
-    patience: float | None = None  #: an estimator that has not decided after this time is stopped [s]; None: never
-
-
-@dataclass(frozen=True)
-class Study:
+class Study(Settings):
     """A study file; the defaults are those of a study without a file."""
 
-    name: str = "sweep"
-    scenes: tuple[str, ...] = ()
     random: RandomScenes = RandomScenes()
     half: tuple[str, ...] = ()  #: scenes that are compared at half the width
-    sizes: tuple[tuple[int, int], ...] = (SIZE,)
     configurations: tuple[Configuration, ...] = ()
     media: tuple[tuple[str, ...], ...] = ((),)
-    measure: Measure = Measure()
     points: int | None = None  #: of area lights in references, see `validation.estimates.quadrature.reference_image`
-    flip: str = "none"  #: which configurations get HDR-FLIP: 'none', 'kinds' (those of `QUICK`) or 'all'
     timed: int | None = None  #: scenes that are timed alone, the first; None for all
     limit: float = 600.0  #: seconds that a cell or a reference may take
     retries: int = 3  #: how often a cell is begun again whose process died
-    checks: Checks = Checks()
-    stability: int = 0  #: generated rays for the stability of kernels; 0 leaves it out
-    growth: tuple[str, ...] = ()  #: kinds of work by whose growth a scene is timed
+
+    @property
+    def settings(self) -> Settings:
+        """The settings that a report shows, with the names of all scenes."""
+        asked = {each.name: getattr(self, each.name) for each in fields(Settings)}
+        return Settings(**asked | {"scenes": tuple(self.scene_names())})
 
     def at(self, size: tuple[int, int] | None) -> "Study":
         """Return the study with images and timed frames of another size [pixels]; itself for None."""
@@ -166,11 +138,10 @@ class Study:
             return self
         size, checked = ((width // 2, height // 2) for width, height in (self.sizes[0], self.checks.size))
         samples = {**self.checks.samples, "volpath": 4 * self.checks.samples["volpath"]}
-        timed = self.measure.timed_size or self.sizes[0]
         return replace(
             self,
             sizes=(size,),
-            measure=replace(self.measure, timed_size=timed),
+            measure=replace(self.measure, timed_size=self.timed_size),
             checks=replace(self.checks, size=checked, samples=samples),
         )
 

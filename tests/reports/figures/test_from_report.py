@@ -59,7 +59,7 @@ def report(tmp_path_factory):
     data = report_of(
         [studied],
         created="2031-01-02 03:04:05 +0000",
-        settings=settings(image=[32, 24], timed=[32, 24]),
+        settings=settings(sizes=[[32, 24]], measure={}),
         environment=environment(processor="a slide rule"),
     )
     checked(data)

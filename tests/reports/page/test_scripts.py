@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the scripts of pages compute, in a JavaScript engine without a browser.
+"""The scripts of pages compute what they should, in a JavaScript engine without a browser.
 
 The viewer of a report shows what the files hold, and the camera of the view goes where the mouse leads it. How pages
 look, and that browsers run them, is for `tests/reports/test_browser.py`.

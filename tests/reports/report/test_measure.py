@@ -87,7 +87,12 @@ def test_the_data_are_read_again_and_every_file_that_they_name_is_there(written)
     data = json.loads((written.folder / "report.json").read_text(encoding="utf-8"))
     assert data == written.data
     assert report_text(read_report(written.folder)) == report_text(written.report)
-    assert (data["command"], data["settings"]["name"]) == ("airlight report --tiny", "tiny")
+    assert data["command"] == "airlight report --tiny"
+    # The settings are the study's own records, and come back from the file as they were.
+    asked = read_report(written.folder).settings
+    assert asked == replace(TINY.settings, scenes=asked.scenes)
+    assert (asked.timed_size, len(asked.scenes)) == ((12, 9), 1)
+    assert asked.scenes[0].endswith("my <fog>.xml")
     (scene,) = data["scenes"]
     assert (scene["name"], scene["size"]) == ("my <fog>", [20, 15])
     checks = {f"{estimator} {layer}" for estimator in TINY.checks.margins for layer in ("airlight", "surface")}
