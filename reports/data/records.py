@@ -213,17 +213,6 @@ def named_files(report: Report) -> Iterator[str]:
             yield from method.files.values()
 
 
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema of report.json, with the meaning of each key."""
-    import msgspec
-
-    made, kinds = msgspec.json.schema(Report), record_types()
-    for name, shown in made["$defs"].items():
-        for key, meaning in meanings(kinds[name]).items():
-            shown["properties"][key] = {**shown["properties"][key], "description": meaning}
-    return made
-
-
 def record_types(kind: Any = Report) -> dict[str, type]:
     """Return the classes of a record and of those within it, by name."""
     found: dict[str, type] = {kind.__name__: kind} if isinstance(kind, type) and is_dataclass(kind) else {}
