@@ -72,6 +72,8 @@ def _history(fog: Array, surface: Array, size: tuple[int, int], rng: np.random.G
     return gaussian_filter(fog, (0.7, 0.7, 0)) * (1 + 0.03 * _noise(size, rng)) + surface
 
 
+#: By error of an engine, the names that are true of an image with it.
+TRUE = {"half resolution": ("shift", "fog-shift")}
 #: Errors of engines, in right and in faulty images; the march of few steps is one of the scene, see `_images`.
 ERRORS: dict[str, Callable[[Array, Array, tuple[int, int], np.random.Generator], Array]] = {
     "white noise": _white,
@@ -196,11 +198,17 @@ def counts(rows: list[dict[str, Any]], evidence: float, left: float) -> dict[str
     right = [row for row in rows if row["fault"] == "right"]
     faulty = [row for row in rows if row["fault"] != "right"]
     return {
-        "false": sum(named(row, evidence, left) for row in right),
+        "false": sum(named(row, evidence, left) and row["found"] not in TRUE.get(row["error"], ()) for row in right),
         "right": len(right),
-        "found": sum(named(row, evidence, left) and row["found"] == row["fault"] for row in faulty),
+        "found": sum(named(row, evidence, left) and _is_found(row) for row in faulty),
         "faulty": len(faulty),
     }
+
+
+def _is_found(row: dict[str, Any]) -> bool:
+    """Return whether the fault is named first, or together with a name that is true of the errors."""
+    true = row["found"] in TRUE.get(row["error"], ()) and row["fault"] in row["together"]
+    return bool(row["found"] == row["fault"] or true)
 
 
 def chosen_limits(rows: list[dict[str, Any]]) -> tuple[float, float]:

@@ -10,7 +10,9 @@ The mutations are those of Cosmic Ray (`pip install cosmic-ray pytest-cov`): a c
 replaced, a condition is turned, a loop does not run. They are drawn from all mutations of the rooms with equal chances.
 The tests of a line come from a run of the default tests with coverage, whose contexts say which test runs which line;
 `--baseline` keeps that run for another draw. A line that runs once, when its file is imported, has the tests that run
-anything of the file. The fastest are run first, and no more of them than take LONGEST.
+anything of the file, and a line that no test runs, or only a process of its own, those that run anything of its folder.
+The fastest are run first, and no more of them than take LONGEST. `--again FILES` tries the survivors of the record by
+all tests of these files, such as new ones, and keeps their judgements.
 """
 
 import argparse
@@ -24,11 +26,12 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
+from typing import Any
 from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -153,6 +156,9 @@ def tests_of(mutation: Mutation, found: Mapping[tuple[str, int], set[str]], took
     at_import = not any(isinstance(each, ast.FunctionDef) and each is not innermost for each in around)
     if at_import:
         tests = set().union(*(those for (path, _), those in found.items() if path == mutation.path))
+    if not tests:  # the line runs in a process of its own, or never
+        folder = mutation.path.rpartition("/")[0] + "/"
+        tests = set().union(*(those for (path, _), those in found.items() if path.startswith(folder)))
     chosen, seconds = [], 0.0
     for test in sorted(tests, key=lambda test: took.get(test, 0.0)):
         seconds += took.get(test, 0.0)
@@ -180,8 +186,13 @@ def outcome(mutation: Mutation, copy: Path, tests: Sequence[str], seconds: float
     return Outcome(mutation, status == 0, len(tests), " -> ".join(lines))
 
 
-def survey(chosen: Sequence[Mutation], found: Mapping[tuple[str, int], set[str]], took: Mapping[str, float], jobs: int):
-    """Yield the outcome of each mutation; `jobs` of them are tried at a time, each in a copy of its own."""
+def survey(
+    chosen: Sequence[Mutation], tests_for: Callable[[Mutation], tuple[Sequence[str], float]], jobs: int
+) -> Iterator[Outcome]:
+    """Yield the outcome of each mutation; `jobs` of them are tried at a time, each in a copy of its own.
+
+    `tests_for`: returns the tests of a mutation, and what they take together [s].
+    """
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
         copies: SimpleQueue[Path] = SimpleQueue()
         tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
@@ -193,10 +204,9 @@ def survey(chosen: Sequence[Mutation], found: Mapping[tuple[str, int], set[str]]
             copies.put(Path(folder, str(number)))
 
         def tried(mutation: Mutation) -> Outcome:
-            tests = tests_of(mutation, found, took)
             copy = copies.get()
             try:
-                return outcome(mutation, copy, tests, sum(took.get(test, 0.0) for test in tests))
+                return outcome(mutation, copy, *tests_for(mutation))
             finally:
                 copies.put(copy)
 
@@ -211,17 +221,33 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--jobs", type=int, default=2, help="how many are tried at a time")
     parser.add_argument("--baseline", type=Path, help="folder that keeps the run of all tests; by default none does")
+    parser.add_argument("--again", nargs="+", metavar="FILE", help="test files that the survivors of the record meet")
     asked = parser.parse_args()
+    if asked.again:
+        record = json.loads(RECORD.read_text(encoding="utf-8"))
+        before = [Outcome(**(each | {"mutation": Mutation(**each["mutation"])})) for each in record["survivors"]]
+        record["survivors"] = []
+        for old, each in zip(
+            before, survey([each.mutation for each in before], lambda _: (asked.again, LONGEST), asked.jobs)
+        ):
+            if each.survived:
+                record["survivors"].append(asdict(replace(old, change=each.change)))
+        record |= {"survived": len(record["survivors"])}
+        write(record)
+        return
     every = list(mutations(asked.rooms))
     chosen = random.Random(asked.seed).sample(every, min(asked.sample, len(every)))
     with tempfile.TemporaryDirectory() as folder:
         found, took = covering_tests(asked.rooms, asked.baseline or Path(folder))
-    outcomes, start = [], time.monotonic()
-    for each in survey(chosen, found, took, asked.jobs):
+
+    def tests_for(mutation: Mutation) -> tuple[Sequence[str], float]:
+        tests = tests_of(mutation, found, took)
+        return tests, sum(took.get(test, 0.0) for test in tests)
+
+    outcomes = []
+    for each in survey(chosen, tests_for, asked.jobs):
         outcomes.append(each)
-        if each.survived:
-            print(f"survives {each.mutation.path}:{each.mutation.line} ({each.tests} tests): {each.change}", flush=True)
-        survivors = [each for each in outcomes if each.survived]
+        survivors = [asdict(each) for each in outcomes if each.survived]
         record = {
             "date": time.strftime("%Y-%m-%d"),
             "rooms": list(asked.rooms),
@@ -229,12 +255,15 @@ def main() -> None:
             "sample": len(outcomes),
             "seed": asked.seed,
             "survived": len(survivors),
-            "untested": sum(each.tests == 0 for each in survivors),
-            "survivors": [asdict(each) for each in survivors],
+            "survivors": survivors,
         }
-        RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    minutes = (time.monotonic() - start) / 60
-    print(f"{len(survivors)} of {len(outcomes)} survived, in {minutes:.0f} minutes; written: {RECORD}")
+        write(record)
+
+
+def write(record: Mapping[str, Any]) -> None:
+    """Write the record, and print how many survive."""
+    RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    print(f"{record['survived']} of {record['sample']} survived; written: {RECORD}", flush=True)
 
 
 if __name__ == "__main__":
