@@ -15,6 +15,7 @@ light moved, and of light volumes what is not the rendering of the view or of th
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -211,26 +212,33 @@ def _filter_errors(renderer: FrameRenderer, shadow_map: ShadowMap, heights: Arra
 def _biased() -> list[float]:
     """Return for each bias the relative RMSE of the sum with depth testing to the sum with clamped depths."""
     loaded = load_scene("omni-box", _BIAS_SIZE).scene
-    scene, reference = read_scene(loaded), read_reference(loaded)
+    scene = read_scene(loaded)
     light = scene.lights[0]
     depth = render_frame(_renderer(scene, "mesh", _BIAS_MAP)).distance.astype(np.float64).ravel()
+    mesh = volume_mesh(cast_shadow_map(scene.geometry, light, _BIAS_MAP), light)
+    sum_of = partial(crossings_sum, loaded, depth)
+    clamped = sum_of(mesh, clamp=True)
+    pushed = (sum_of(_pushed(mesh, light, bias), clamp=False) for bias in BIASES)
+    return [known(error_metrics(clamped, image).relative_rmse) for image in pushed]
+
+
+def crossings_sum(loaded: Any, depth: Array, mesh: VolumeMesh, *, clamp: bool) -> Array:
+    """Return the airlight integral of the first light from the crossings of a mesh, (height, width) [1/m].
+
+    `loaded`: the `mi.Scene`; `depth`: of the visible surface in each pixel, row by row [m]; `clamp`: whether a crossing
+    behind it counts as one at the surface, otherwise it does not count.
+    """
+    camera, reference = read_scene(loaded).camera, read_reference(loaded)
     foot, height = foot_and_height(reference.origin, reference.direction, reference.lights[0].position)
     sigma = float(reference.medium.sigma_t[0])
-    mesh = volume_mesh(cast_shadow_map(scene.geometry, light, _BIAS_MAP), light)
-
-    def summed(shown: VolumeMesh, *, clamp: bool) -> Array:
-        total = np.zeros(len(depth))
-        for batch in signed_crossings(shown, scene.camera):
-            pixel, x, sign = (np.array(each) for each in (batch.pixel, batch.distance, batch.sign))
-            drawn = np.ones(len(x), dtype=bool) if clamp else x < depth[pixel]
-            pixel, sign, end = pixel[drawn], sign[drawn], np.minimum(x, depth[pixel])[drawn]
-            J, _ = airlight_segments(foot[pixel], height[pixel], 0.0, end, sigma, PhaseFunction("isotropic"))
-            np.add.at(total, pixel, sign * J)
-        return np.repeat(total.reshape(_BIAS_SIZE[::-1])[:, :, None], 3, axis=2)
-
-    clamped = summed(mesh, clamp=True)
-    pushed = (summed(_pushed(mesh, light, bias), clamp=False) for bias in BIASES)
-    return [known(error_metrics(clamped, image).relative_rmse) for image in pushed]
+    total = np.zeros(len(depth))
+    for batch in signed_crossings(mesh, camera):
+        pixel, x, sign = (np.array(each) for each in (batch.pixel, batch.distance, batch.sign))
+        drawn = np.ones(len(x), dtype=bool) if clamp else x < depth[pixel]
+        pixel, sign, end = pixel[drawn], sign[drawn], np.minimum(x, depth[pixel])[drawn]
+        J, _ = airlight_segments(foot[pixel], height[pixel], 0.0, end, sigma, PhaseFunction("isotropic"))
+        np.add.at(total, pixel, sign * J)
+    return total.reshape(reference.height, reference.width)
 
 
 def _pushed(mesh: VolumeMesh, light: Light, bias: float) -> VolumeMesh:

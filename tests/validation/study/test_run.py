@@ -5,6 +5,7 @@ import weakref
 from dataclasses import replace
 from types import SimpleNamespace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from scipy import stats
@@ -14,7 +15,9 @@ from realtime.frame.renderer import FrameRenderer
 from realtime.memory import Memory
 from realtime.methods.unshadowed import unshadowed
 from realtime.scene.read_scene import SceneFeatures, read_scene
+from reference.quadrature.ray_values import ReferenceImage
 from reports.commands.main import run as run_command
+from tests.helpers.scenes import tiny_scene
 from validation.estimates.quadrature import reference_of_pixels
 from validation.metrics.errors import error_metrics
 from validation.study import cost as expected_work
@@ -166,6 +169,22 @@ def test_a_frame_is_judged_by_the_preparation_of_all_its_groups_of_lights(clock,
     row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.5))[0]
     assert (row.status, row.error, row.times) == ("left out", None, None)
     assert "what a frame prepares takes 1 s, more than the limit of 0.5 s" in row.reason
+
+
+@pytest.mark.usefixtures("variant")
+def test_pixels_that_have_a_reference_keep_their_places_and_others_are_none(monkeypatch):
+    def of_pixels(scene, pixels, plan):
+        values = np.multiply.outer([pixels], [1.0, 2.0, 3.0])
+        bound, spread, none = 0.5 * values, 0.1 * values, np.zeros(values.shape)
+        return ReferenceImage(values, bound, none, none[..., 0], none[..., 0], 0, 0.0, airlight_se=spread)
+
+    monkeypatch.setattr(sampled, "reference_of_pixels", of_pixels)
+    some = sampled.sampled_reference(mi.load_dict(tiny_scene(size=(40, 32))))
+    number = np.arange(40 * 32).reshape(32, 40)
+    assert some["mask"].sum() == 40 * 32 // 16
+    expected = np.where(some["mask"], number, 0)[..., None] * np.array([1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(some["airlight"], expected)
+    np.testing.assert_allclose(some["bound"], 0.5 * expected + 3 * 0.1 * expected)  # three standard errors
 
 
 @pytest.mark.slow
