@@ -38,9 +38,12 @@ def faults_of(predictor: Predictor) -> tuple[Fault, ...]:
         "directional lights": range(near, far),
         "area lights": range(far, len(sources)),
     }
-    groups = {name: tuple(numbers) for name, numbers in classes.items() if 0 < len(numbers) < len(sources)}
+    groups = {name: tuple(numbers) for name, numbers in classes.items() if 1 < len(numbers) < len(sources)}
+    # A light that is the only one of its class is looked at even among many.
+    singles = [(numbers[0],) for numbers in classes.values() if len(numbers) == 1 < len(sources)]
     if 1 < len(sources) <= _MANY_LIGHTS:
-        groups |= {f"the light '{source.name}'": (number,) for number, source in enumerate(sources)}
+        singles = [(number,) for number in range(len(sources))]
+    groups |= {f"the light '{sources[number].name}'": (number,) for (number,) in singles}
     own = []
     for which, numbers in groups.items():
         are, they = ("is", "it") if len(numbers) == 1 else ("are", "they")
