@@ -148,7 +148,7 @@ def tests_of(mutation: Mutation, found: Mapping[tuple[str, int], set[str]], took
     """Return the tests that run the statement of a mutation, the fastest first."""
     text = (ROOT / mutation.path).read_text(encoding="utf-8")
     around = [each for each in ast.walk(ast.parse(text)) if isinstance(each, ast.stmt)]
-    around = [each for each in around if each.lineno <= mutation.line <= (each.end_lineno or each.lineno)]
+    around = [each for each in around if _begin(each) <= mutation.line <= (each.end_lineno or each.lineno)]
     innermost = max(around, key=lambda each: each.lineno)
     body = getattr(innermost, "body", None)
     end = body[0].lineno - 1 if body else innermost.end_lineno or innermost.lineno
@@ -166,6 +166,11 @@ def tests_of(mutation: Mutation, found: Mapping[tuple[str, int], set[str]], took
             break
         chosen.append(test)
     return chosen
+
+
+def _begin(statement: ast.stmt) -> int:
+    """Return the first line of a statement, that of its first decorator where it has some."""
+    return min([statement.lineno, *(each.lineno for each in getattr(statement, "decorator_list", ()))])
 
 
 def outcome(mutation: Mutation, copy: Path, tests: Sequence[str], seconds: float) -> Outcome:

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Claim: each fault of the medium, the lights and the values makes of a guess what its words say."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from analytic.height_fog import HeightFog, Layer
+from validation.engine.fault import Fault, factor_name
+from validation.engine.faults import FAULTS
+from validation.engine.light_faults import position_held
+from validation.engine.prediction import Guess
+from validation.fog_model.radiance import Fog
+
+FOG = Fog(
+    sigma_t=((0.5, 0.5, 0.4), (0.0, 0.0, 0.0)),
+    albedo=((0.8, 0.6, 1.0), (0.9, 0.9, 0.9)),
+    phase=(0.3, None),
+    intensity=(2.0, 3.0),
+    airlight=(1.0, 1.0),
+    surface=(1.0, 1.0),
+    moved=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+)
+LAYERED = replace(FOG, height=HeightFog((Layer(1.0, 2.0, 4.0), Layer(0.5, -1.0, 8.0))))
+
+
+def fault(*words: str) -> Fault:
+    found = [each for each in FAULTS if all(word in each.words for word in words)]
+    (chosen,) = [each for each in found if each.words == words[0]] or found
+    return chosen
+
+
+def changed(each: Fault, *values: float, fog: Fog = FOG, predictor: Any = None) -> Guess:
+    return each.change(predictor, Guess(fog), values)
+
+
+@pytest.mark.parametrize(
+    ("words", "values", "sigma_t", "albedo"),
+    [
+        ("one over what it should be: a mean free path", (), (2.0, 2.0, 2.5), (0.8, 0.6, 1.0)),
+        ("the extinction is {0:.4g} times", (2.0,), (1.0, 1.0, 0.8), (0.8, 0.6, 1.0)),
+        ("the absorption is {0:.4g} times", (2.0,), (0.6, 0.7, 0.4), (4 / 6, 3 / 7, 1.0)),
+        ("the medium does not absorb", (), (0.4, 0.3, 0.4), (1.0, 1.0, 1.0)),
+        ("taken for the scattering coefficient", (), (0.625, 0.5 / 0.6, 0.4), (0.8, 0.6, 1.0)),
+        ("the albedo was applied twice", (), (0.5, 0.5, 0.4), (0.64, 0.36, 1.0)),
+        ("the albedo was left out", (), (0.5, 0.5, 0.4), (1.0, 1.0, 1.0)),
+        ("the albedo was decoded", (), (0.5, 0.5, 0.4), (0.60383, 0.31855, 1.0)),
+        ("the albedo was encoded", (), (0.5, 0.5, 0.4), (0.90633, 0.79774, 1.0)),
+    ],
+)
+def test_optics_by_hand(words, values, sigma_t, albedo):
+    fog = changed(fault(words), *values).fog
+    assert fog.sigma_t[0] == pytest.approx(sigma_t)
+    assert fog.albedo[0] == pytest.approx(albedo, abs=1e-5)
+    assert (fog.sigma_t[1], fog.albedo[1]) == (FOG.sigma_t[1], FOG.albedo[1])  # nothing stays nothing
+
+
+def test_phase_functions_are_normalised_and_have_their_shapes():
+    laws = {
+        "Schlick's, with k = g": (1 - 0.09) / (1 - 0.3 * 0.5) ** 2,
+        "Schlick's, with k = 1.55": None,
+        "Cornette and Shanks's": 1.5 * 0.91 / 2.09 * 1.25 / (1.09 - 0.3) ** 1.5,
+        "Rayleigh's": 0.75 * 1.25,
+        "a cosine was taken": 2.0,
+    }
+    for words, at_half in laws.items():
+        law = changed(fault(words)).fog.phase[0]
+        assert quad(lambda c, law=law: float(law(np.array(c))), -1, 1, points=[0])[0] / 2 == pytest.approx(1)
+        if at_half is not None:
+            assert float(law(np.array(0.5))) == pytest.approx(at_half)
+    k = 1.55 * 0.3 - 0.55 * 0.027
+    law = changed(fault("Schlick's, with k = 1.55")).fog.phase[0]
+    assert float(law(np.array(-0.5))) == pytest.approx((1 - k * k) / (1 + 0.5 * k) ** 2)
+
+
+def test_lobes_have_another_g_and_other_phase_functions_stay():
+    assert changed(fault("has the other sign")).fog.phase == (-0.3, None)
+    assert changed(fault("g of the phase function is {0"), 0.7).fog.phase == (0.7, None)
+    assert changed(fault("the phase function is isotropic")).fog.phase == (0.0, None)
+    assert changed(fault("Henyey and Greenstein's with g"), 0.7).fog.phase == (0.7, 0.7)
+
+
+@pytest.mark.parametrize(
+    ("words", "segments"),
+    [
+        (("the way from the light is not attenuated",), {"light_segment": (0.0, 0.0)}),
+        (("the way to the camera is not attenuated",), {"camera_segment": (0.0, 0.0)}),
+        (("from the light", "for the fog, for surfaces it is"), {"light_segment": (0.0, 1.0)}),
+        (("from the light", "for surfaces, for the fog it is"), {"light_segment": (1.0, 0.0)}),
+        (("way to the camera", "for the fog, for surfaces it is"), {"camera_segment": (0.0, 1.0)}),
+        (("way to the camera", "for surfaces, for the fog it is"), {"camera_segment": (1.0, 0.0)}),
+        (("nothing is attenuated",), {"light_segment": (0.0, 0.0), "camera_segment": (0.0, 0.0)}),
+    ],
+)
+def test_ways_that_are_not_attenuated(words, segments):
+    assert changed(fault(*words)).fog == replace(FOG, **segments)
+
+
+def test_another_unit_of_length_dims_lights_at_places_alone():
+    predictor = SimpleNamespace(reference=SimpleNamespace(lights=(None,)))
+    fog = changed(fault("another unit of length"), 10.0, predictor=predictor).fog
+    assert fog.intensity == pytest.approx((0.02, 3.0))  # the second light is far
+    assert fog.sigma_t[0] == pytest.approx((5.0, 5.0, 4.0))
+
+
+def test_the_medium_begins_and_ends_at_planes_and_distances():
+    found = {
+        "up to 0.3 m before": (0.3, np.inf, False),
+        "up to {0:.4g} m before the camera: its near plane": (2.5, np.inf, False),
+        "a start distance": (2.5, np.inf, True),
+        "the fog ends {0:.3g} m before the camera, at a plane": (0.0, 2.5, False),
+        "the fog ends {0:.3g} m away from the camera": (0.0, 2.5, True),
+    }
+    for words, expected in found.items():
+        each = fault(words)
+        fog = changed(each, *([2.5] if each.parameters else [])).fog
+        assert (fog.near, fog.far, fog.spherical) == expected
+    view = SimpleNamespace(
+        distance=np.array([*np.arange(11.0), np.inf]),
+        reference=SimpleNamespace(lights=(SimpleNamespace(position=np.array([0.0, 3.0, 4.0])),), origin=np.zeros(3)),
+    )
+    ends = fault("the fog ends", "at a plane").begin(SimpleNamespace(view=view), Guess(FOG))
+    assert ends == [pytest.approx((9 * part,)) for part in (0.9, 0.6, 0.35)]
+    view.distance = np.array([np.inf])
+    assert fault("the fog ends", "at a plane").begin(SimpleNamespace(view=view), Guess(FOG))[0] == (9.0,)
+
+
+def test_depths_are_taken_for_distances_where_the_words_say():
+    for words, where in {
+        "in the attenuation and where rays end": {"surfaces", "ends"},
+        "in the attenuation and the steps of the march": {"nodes", "surfaces", "steps"},
+        "in the attenuation of surfaces": {"surfaces"},
+    }.items():
+        assert changed(fault("taken for distances", words)).fog.planar == where
+
+
+def test_height_fog_by_hand():
+    def layers(*words: str, values: tuple[float, ...] = ()) -> list[tuple[float, float, float]]:
+        height = changed(fault(*words), *values, fog=LAYERED).fog.height
+        assert height is not None
+        return [(each.sigma_t, each.base, each.scale_height) for each in height.layers]
+
+    assert layers("a falloff was asked for") == [(1.0, 2.0, 0.25), (0.5, -1.0, 0.125)]
+    half = [(1.0, 2.0, pytest.approx(4 / math.log(2))), (0.5, -1.0, pytest.approx(8 / math.log(2)))]
+    assert layers("densities halve") == half
+    doubled = [(1.0, 2.0, pytest.approx(4 * math.log(2))), (0.5, -1.0, pytest.approx(8 * math.log(2)))]
+    assert layers("ln 2 times") == doubled
+    assert layers("bases of layers are", values=(1.5,)) == [(1.0, 3.5, 4.0), (0.5, 0.5, 8.0)]
+    assert layers("and bases {1", values=(0.5, 1.5)) == [(1.0, 3.5, 2.0), (0.5, 0.5, 4.0)]
+    assert changed(fault("layers are clamped"), fog=LAYERED).fog.height.clamped
+    even = changed(fault("the fog is homogeneous"), 0.2, fog=LAYERED).fog
+    assert (even.sigma_t, even.height.density([-5.0, 9.0]).tolist()) == (((0.2, 0.2, 0.2),), [1.0, 1.0])
+    lights = (SimpleNamespace(position=np.array([0.0, 0.0, 2.0])),)
+    predictor = SimpleNamespace(reference=SimpleNamespace(origin=np.array([5.0, 5.0, -1.0]), lights=lights))
+    # Densities 1 + 0.5 exp(-3/8) at the lamp, exp(3/4) + 0.5 at the camera.
+    mean = (1 + 0.5 * math.exp(-3 / 8) + math.exp(3 / 4) + 0.5) / 2
+    begun = fault("the fog is homogeneous").begin(predictor, Guess(LAYERED))
+    assert begun == [pytest.approx((mean * part,)) for part in (1.0, 0.3, 3.0)]
+
+
+def test_light_by_distance_is_what_the_words_say():
+    r = np.array([0.5, 1.0, 2.0, 5.0])
+
+    def window(*words: str, values: tuple[float, ...]) -> np.ndarray:
+        found = changed(fault(*words), *values).fog.window
+        assert found is not None
+        return found(r)
+
+    np.testing.assert_allclose(window("(r^2 + e)", "softened", values=(1.0,)), [0.2, 0.5, 0.8, 25 / 26])
+    disk = 2 / (r**2 + 4 + r * np.sqrt(r**2 + 4))
+    np.testing.assert_allclose(window("that of a disk", values=(2.0,)) / r**2, disk)
+    ended = np.array([0.2, 0.5, 0.8, 0.0]) * (1 - np.minimum(r / 4, 1) ** 4) ** 2
+    np.testing.assert_allclose(window("and ends by", values=(1.0, 4.0)), ended)
+    s = np.minimum(r / 4, 1)
+    for words, expected in {
+        "(1 - (r/R)^4)^2 with R = {0": (1 - s**4) ** 2,
+        "by 1 - (r/R)^4": 1 - s**4,
+        "(1 - (r/R)^2)^2": (1 - s**2) ** 2,
+        "by 1 - r/R": 1 - s,
+        "they end at": (s < 1).astype(float),
+    }.items():
+        np.testing.assert_allclose(window("lights have a range", words, values=(4.0,)), expected)
+    assert changed(fault("not over its square")).fog.distance_power == 1
+    assert changed(fault("does not fall with the distance")).fog.distance_power == 0
+
+
+def test_spots_and_places_are_those_of_the_scenery():
+    assert changed(fault("a half angle was taken")).scenery.cone == 2.0
+    assert changed(fault("a whole angle was taken")).scenery.cone == 0.5
+    assert changed(fault("the angles of spots are {0"), 1.2).scenery.cone == 1.2
+    assert changed(fault("hard edge")).scenery.edge == "hard"
+    assert changed(fault("from their axis on")).scenery.edge == "smooth"
+    assert changed(fault("as a line in the cosine")).scenery.edge == "linear"
+    assert changed(fault("as glTF has it")).scenery.edge == "square"
+    assert changed(fault("3 x^2 - 2 x^3")).scenery.edge == "smoothstep"
+    assert changed(fault("Blender's with a blend"), 0.4).scenery.blend == 0.4
+    assert changed(fault("are spheres of the radius"), 0.4).scenery.radius == 0.4
+    assert changed(fault("the first light is off by ({0:.3g}, {1:.3g}, {2:.3g}) m"), 1.0, -2.0, 0.5).scenery.moved == (
+        (1.0, -2.0, 0.5),
+    )
+
+
+def test_a_light_whose_shadows_are_held_moves_its_fog_alone():
+    lamp = SimpleNamespace(reference=SimpleNamespace(lights=(SimpleNamespace(axis=None),)))
+    held = position_held(lamp, Guess(FOG), (1.0, 2.0, 3.0), (0.5, 2.0, 2.0))
+    assert held.scenery.moved == ((0.5, 2.0, 2.0),)
+    assert held.fog.moved == ((0.5, 0.0, 1.0), (0.0, 0.0, 0.0))
+    spot = SimpleNamespace(reference=SimpleNamespace(lights=(SimpleNamespace(axis=np.array([0.0, 0.0, -1.0])),)))
+    held = position_held(spot, Guess(FOG), (1.0, 2.0, 3.0), (0.5, 2.0, 2.0))
+    assert held.scenery.moved == ((1.0, 2.0, 3.0),)
+    assert held.fog.moved == FOG.moved
+
+
+def test_values_and_the_camera_by_hand():
+    colours = np.array([[1.0, 2.0, 4.0], [0.25, 0.5, 0.125]])
+
+    def values(*words: str, numbers: tuple[float, ...] = (), predictor: Any = None) -> np.ndarray:
+        (change,) = changed(fault(*words), *numbers, predictor=predictor).values
+        return change(colours)
+
+    np.testing.assert_allclose(values("channel order B, G, R"), colours[:, ::-1])
+    np.testing.assert_allclose(values("channel order G, B, R"), colours[:, [1, 2, 0]])
+    np.testing.assert_allclose(values("a black level", numbers=(0.5,)), colours + 0.5)
+    np.testing.assert_allclose(values("a gamma of", numbers=(2.0,)), np.sqrt(colours))
+    seen = SimpleNamespace(values=np.array([[1.5, np.nan, 0.3]]))
+    np.testing.assert_allclose(values("cut off at", predictor=SimpleNamespace(seen=seen)), np.minimum(colours, 1.5))
+    cosines = SimpleNamespace(cosines=np.array([1.0, 0.5]))
+    fallen = values("a vignette", numbers=(2.0,), predictor=cosines)
+    np.testing.assert_allclose(fallen, colours * [[1.0], [0.25]])
+    exposed = changed(fault("the image is {0:.4g} times as bright"), 3.0, fog=replace(FOG, exposure=(1.0, 2.0, 1.0)))
+    assert exposed.fog.exposure == (3.0, 6.0, 3.0)
+    assert changed(fault("the image is {0:.3g} pixels too far right"), 0.5, -1.25).scenery.offset == (-0.5, 1.25)
+    oblong = SimpleNamespace(shape=(30, 40))
+    assert changed(fault("of the other axis"), predictor=oblong).scenery.zoom == pytest.approx(4 / 3)
+    assert changed(fault("the image shows {0:.4g} times the width that it should"), 1.25).scenery.zoom == 1.25
+    image = np.arange(12.0).reshape(2, 2, 3)
+    assert (changed(fault("interchanged")).undo(image) == image.transpose(1, 0, 2)).all()
+    assert (changed(fault("mirrored")).undo(image) == image[:, ::-1]).all()
+    assert (changed(fault("turned by 180")).undo(image) == image[::-1, ::-1]).all()
+
+
+def test_light_of_higher_orders_is_added_to_the_fog_or_to_all():
+    more = np.arange(24.0).reshape(2, 4, 3)
+    predictor = SimpleNamespace(light=SimpleNamespace(higher_orders=more), pixels=np.array([2, 0]))
+    ones = np.ones((2, 3))
+    for words, of_surfaces in (("light of multiple scattering", 0), ("light of higher orders", 1)):
+        (layer,) = changed(fault(words), 0.5, predictor=predictor).layers
+        airlight, surface = layer(ones, 2 * ones)
+        np.testing.assert_allclose(airlight, 1 + 0.5 * more[0][[2, 0]])
+        np.testing.assert_allclose(surface, 2 + 0.5 * of_surfaces * more[1][[2, 0]])
+    none = SimpleNamespace(light=SimpleNamespace(higher_orders=None))
+    (layer,) = changed(fault("light of higher orders"), 0.5, predictor=none).layers
+    assert layer(1.0, 2.0) == (1.0, 2.0)
+
+
+def test_factors_that_have_a_name_get_it():
+    assert factor_name(4 * math.pi) == " (4 pi)"
+    assert factor_name(1 / math.pi) == " (1/(pi))"
+    assert factor_name(1 / 12.9) == " (1/(12.92, the slope of the sRGB curve at black))"
+    assert factor_name(1.02 * math.pi) == ""
