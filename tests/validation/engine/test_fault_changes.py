@@ -263,3 +263,13 @@ def test_factors_that_have_a_name_get_it():
     assert factor_name(1 / math.pi) == " (1/(pi))"
     assert factor_name(1 / 12.9) == " (1/(12.92, the slope of the sRGB curve at black))"
     assert factor_name(1.02 * math.pi) == ""
+
+
+def test_ranges_of_numbers_hold_their_starts_and_what_changes_nothing():
+    for each in FAULTS:
+        for number in each.parameters:
+            assert all(number.low <= start <= number.high for start in number.starts), each.words
+            # A factor of 1 and an amount of 0 change nothing; an edge without a blend is another fault.
+            nothing = 1.0 if number.scale == "log" else 0.0
+            assert number.low <= nothing <= number.high or "blend" in each.words, each.words
+            assert "g {0" not in each.words or -1 < number.low < number.high < 1

@@ -39,7 +39,7 @@ def test_the_change_by_azimuth_is_that_of_the_sum_of_the_modes(monkeypatch):
 
 
 def test_reflectance_of_a_thin_slab_is_that_of_one_scattering(monkeypatch):
-    """Of isotropic scattering without absorption half of what is scattered goes up: tau/2."""
+    """Isotropic scattering without absorption sends half of what it scatters up: tau/2."""
     monkeypatch.setattr(slab, "_STREAMS", 8)
     tau = 1e-3
     assert slab._reflectance(tau, HenyeyGreensteinPhase(0.0)) == pytest.approx(tau / 2, rel=0.01)
