@@ -32,7 +32,7 @@ def best_corner(change: Change) -> Callable[[Predictor, Guess], Sequence[Values]
     return begin
 
 
-SHIFT = tuple(Number(-3.0, 3.0, (0.0,), step=0.1) for _ in range(2))
+SHIFT = tuple(Number(-3.0, 3.0, step=0.1) for _ in range(2))  # begun by `best_corner`
 
 
 def _other_axis(predictor: Predictor, guess: Guess, p: Values) -> Guess:

@@ -11,10 +11,12 @@ import pytest
 from scipy.integrate import quad
 
 from analytic.height_fog import HeightFog, Layer
+from validation.engine import prediction
 from validation.engine.fault import Fault, factor_name
 from validation.engine.faults import FAULTS
+from validation.engine.layer_faults import scaled
 from validation.engine.light_faults import position_held
-from validation.engine.prediction import Guess
+from validation.engine.prediction import Guess, SceneLight
 from validation.fog_model.radiance import Fog
 
 FOG = Fog(
@@ -272,4 +274,68 @@ def test_ranges_of_numbers_hold_their_starts_and_what_changes_nothing():
             # A factor of 1 and an amount of 0 change nothing; an edge without a blend is another fault.
             nothing = 1.0 if number.scale == "log" else 0.0
             assert number.low <= nothing <= number.high or "blend" in each.words, each.words
+            # Several numbers are looked for together from one place: where nothing is changed.
+            assert len(each.parameters) == 1 or each.begin or number.starts == (nothing,), each.words
             assert "g {0" not in each.words or -1 < number.low < number.high < 1
+
+
+def test_layers_by_the_opacity_of_the_fog_by_hand():
+    transmittance = np.array([[0.25, 0.5, 1.0]])
+    predictor = SimpleNamespace(transmittance=lambda guess: transmittance)
+    airlight, surface = np.array([[2.0, 4.0, 0.0]]), np.array([[8.0, 8.0, 8.0]])
+
+    def layers(words: str, *values: float) -> list[list[float]]:
+        (layer,) = changed(fault(words), *values, predictor=predictor).layers
+        return [image[0].tolist() for image in layer(airlight, surface)]
+
+    same, thinned = [8.0, 8.0, 8.0], [2.0, 4.0, 8.0]
+    assert layers("blended as a colour") == [[1.5, 2.0, 0.0], same]
+    assert layers("was not premultiplied") == [pytest.approx([2.0 / 0.75, 8.0, 0.0]), same]
+    assert layers("transmittance of the whole ray") == [[0.5, 2.0, 0.0], same]
+    assert layers("on the way to the camera twice") == [[2.0, 4.0, 0.0], thinned]
+    assert layers("mixed by the fog's opacity") == [[1.5, 2.0, 0.0], thinned]
+    assert layers("ambient light", 1.0, 2.0, 3.0) == [[2.75, 5.0, 0.0], same]
+
+
+def test_the_colour_of_ambient_light_is_what_most_of_the_fog_has_too_much():
+    opacity = np.array([0.1, 0.2, 0.3, 0.4])[:, None] * np.ones(3)
+    more = opacity * np.array([2.0, -1.0, 0.5])
+    more[0] = 99.0  # a tenth of the opacity does not decide
+    predictor = SimpleNamespace(
+        transmittance=lambda guess: 1 - opacity, shown=lambda guess: 1 + more, predicted=lambda guess: np.ones((4, 3))
+    )
+    assert fault("ambient light").begin(predictor, Guess(FOG)) == [pytest.approx((2.0, 0.0, 0.5))]
+
+
+def test_a_factor_on_the_fog_or_on_surfaces_begins_where_it_explains_what_is_left():
+    assert changed(fault("the fog is {0:.4g} times as bright"), 3.0).fog == replace(FOG, airlight=(3.0, 3.0))
+    assert changed(fault("surfaces are {0:.4g} times as bright"), 3.0).fog == replace(FOG, surface=(3.0, 3.0))
+    one = scaled("intensity", (1,))(None, Guess(FOG), (3.0,))
+    assert one.fog.intensity == (2.0, 9.0)
+    part = np.array([4.0, 3.0, 2.0, 1.0, 0.0])
+    predictor = SimpleNamespace(
+        predicted=lambda guess: 1 + guess.fog.airlight[0] * part,
+        shown=lambda guess: 1 + np.array([2.5, 2.5, 2.5, 9.0, 7.0]) * part,
+    )
+    assert fault("the fog is {0:.4g} times as bright").begin(predictor, Guess(FOG)) == [pytest.approx((2.5,))]
+    part[:] = 0
+    assert fault("the fog is {0:.4g} times as bright").begin(predictor, Guess(FOG)) == [(1.0,)]
+
+
+def test_higher_orders_are_the_light_beyond_one_scattering_smoothed(monkeypatch):
+    asked = []
+
+    def batch(reference, seed, paths, *, max_depth):
+        asked.append((seed, max_depth))
+        layers = np.arange(1.0, 1 + len(prediction.LAYERS))[:, None, None] * np.ones((1, 12 * 16, 3))
+        return SimpleNamespace(mean=layers * {64: 5.0, 2: 3.0}[max_depth])
+
+    monkeypatch.setattr(prediction, "volpath_batch", batch)
+    orders = SceneLight(SimpleNamespace(width=16, height=12)).higher_orders
+    for number, layer in enumerate(("airlight", "surface")):
+        expected = 2.0 * (1 + prediction.LAYERS.index(layer))
+        np.testing.assert_allclose(orders[number], np.full((12 * 16, 3), expected))
+    seeds = {seed for seed, _ in asked}
+    assert sorted(asked) == [(seed, depth) for seed in sorted(seeds) for depth in (2, 64)]
+    assert len(seeds) > 1
+    assert SceneLight(SimpleNamespace(width=1 << 9, height=1 << 9)).higher_orders is None

@@ -9,10 +9,12 @@ import pytest
 
 from analytic.errors import InputError
 from realtime.scene.read_scene import read_scene
-from tests.helpers.scenes import tiny_scene
+from tests.helpers.scenes import bounded_medium, tiny_scene
 from validation.clock import peak_memory
+from validation.scenes.loading import load_scene
+from validation.scenes.meshes import rotation
 from validation.study.configuration import configuration
-from validation.study.growth import growth, ladder, study_growth, subdivided, triangles_of
+from validation.study.growth import growth, ladder, study_growth, subdivided, triangles_of, with_copies
 from validation.study.study import Measure, Study
 
 
@@ -99,3 +101,38 @@ def test_the_peak_is_that_of_what_was_held_together(variant):
     # The kernel counts pages in batches, and the allocator takes some.
     assert 94 < peak_memory(lambda: work(96)) < 104
     assert peak_memory(lambda: None) < 4
+
+
+def test_copies_of_a_light_stand_near_it_and_have_its_intensity_together(variant):
+    scene = read_scene(load_scene("sphere-spot", (8, 6)).scene)
+    (light,) = scene.lights
+    more = with_copies(scene, 4)
+    assert (len(more.lights), more.features.spot_lights, more.features.point_lights) == (4, 4, 0)
+    place, eye = (np.array(each, dtype=float).ravel() for each in (light.position, scene.camera.origin))
+    total = sum(np.array(each.intensity, dtype=float) for each in more.lights)
+    np.testing.assert_allclose(total, np.array(light.intensity, dtype=float), rtol=1e-6)
+    away = [np.array(each.position, dtype=float).ravel() - place for each in more.lights]
+    distances = np.linalg.norm(away, axis=1)
+    step = 0.07 * np.linalg.norm(place - eye)
+    assert distances[0] == 0
+    # In the plane across, sqrt(n) steps: a spiral; the third coordinate adds at most 0.3 of it.
+    np.testing.assert_allclose(np.hypot(*np.array(away).T[:2]) / step, np.sqrt(np.arange(4)), rtol=1e-4)
+    assert (np.abs(np.array(away)[:, 2]) <= 0.3 * step * np.sqrt(np.arange(4)) + 1e-6).all()
+    assert len({tuple(np.round(each, 6)) for each in away}) == 4
+
+
+def test_copies_of_a_light_from_infinity_are_turned(variant):
+    sun = {"type": "directional", "direction": [0.3, 0.2, -1.0], "irradiance": 2.0}
+    camera = {name: value for name, value in tiny_scene()["sensor"].items() if name != "medium"}
+    body = bounded_medium({"type": "cube"}, 0.3, (0.9, 0.9, 0.9))
+    more = with_copies(read_scene(mi.load_dict(tiny_scene(lamp=sun, fog=None, sensor=camera, body=body))), 3)
+    axes = [np.array(each.exact_axis, dtype=float).ravel() for each in more.lights]
+    turned = [rotation((0.31, 0.53, 0.79), 2.3 * number) @ axes[0] for number in range(3)]
+    np.testing.assert_allclose(axes, turned, atol=1e-6)
+    assert more.features.directional_lights == 3
+
+
+def test_sizes_are_halves_to_four_times_the_width(variant):
+    steps = ladder("size", "open-fog", (10, 7))
+    assert [step.work for step in steps] == [5 * 4, 70, 280, 40 * 28]
+    assert (steps[0].scene().camera.width, steps[0].scene().camera.height) == (5, 4)
