@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Claim: the faults of single lights and classes of lights are said of those lights, in words that agree with them."""
+"""Claim: faults of single lights and classes of lights are said of those; faults that a scene cannot have are not."""
 
 from collections import defaultdict
 from types import SimpleNamespace
 
 import mitsuba as mi
+import numpy as np
 
+from analytic.height_fog import HeightFog
 from reference.scene.read import read_reference
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.engine import faults
+from validation.engine.fault import traits
 from validation.engine.faults import FAULTS, faults_of
+from validation.fog_model.radiance import Fog
 
 
 def test_faults_of_lights_have_their_names_and_numbers(variant, monkeypatch):
@@ -44,3 +48,54 @@ def test_faults_that_a_scene_cannot_have_are_left_out(variant, monkeypatch):
     found = faults_of(SimpleNamespace(reference=scene))
     assert found == tuple(fault for fault in FAULTS if not fault.needs)
     assert 0 < len(found) < len(FAULTS)
+
+
+def test_traits_of_a_scene_and_its_image_by_hand():
+    """A lamp, a soft and a hard spot over a ball in fog of Henyey and Greenstein's function, seen in 4 x 3 pixels."""
+    lights = (
+        SimpleNamespace(axis=None),
+        SimpleNamespace(axis=(0, 0, -1), beam=0.2, cutoff=0.3),
+        SimpleNamespace(axis=(0, 0, -1), beam=0.3, cutoff=0.3),
+    )
+    values = np.random.default_rng(1).uniform(1, 2, (12, 3))
+
+    def found(*, lights=lights, shapes=("ball",), media=(), holds="total", values=values, shape=(3, 4), **fog):
+        phase = SimpleNamespace(is_constant=True)
+        reference = SimpleNamespace(
+            lights=lights,
+            media=media,
+            medium=SimpleNamespace(phase=phase),
+            occluders=SimpleNamespace(shapes=lambda: shapes),
+        )
+        plain = {"sigma_t": ((0.3,) * 3,), "albedo": ((0.9,) * 3,), "phase": (0.4,)}
+        ones = {name: (1.0,) for name in ("intensity", "airlight", "surface")}
+        predictor = SimpleNamespace(
+            reference=reference,
+            fog=Fog(**(plain | ones | {"moved": ((0.0,) * 3,)} | fog)),
+            seen=SimpleNamespace(holds=holds, values=values),
+            shape=shape,
+            shown=lambda guess: values,
+            predicted=lambda guess: values - 0.1,
+        )
+        return {name for name, there in traits(predictor).items() if there}
+
+    usual = {"shapes", "lamps", "point lights", "spots", "soft spots", "no bounds", "even fog", "fog", "all light"}
+    usual |= {"both", "absorption", "lobes", "g", "oblong", "colours", "more light"}
+    assert found() == usual
+    assert found(holds="airlight") == usual - {"all light", "both"}
+    assert found(holds="surface") == usual - {"all light", "both", "fog", "lobes", "g"}
+    assert found(shapes=()) == usual - {"shapes", "both"}
+    assert found(phase=(0.0,)) == usual - {"g"}
+    assert found(phase=(None,)) == usual - {"g", "lobes"} | {"isotropy"}
+    assert found(albedo=((1.0,) * 3,)) == usual - {"absorption"}
+    assert found(sigma_t=((0.0,) * 3,)) == usual - {"absorption"}
+    assert found(lights=lights[:1]) == usual - {"spots", "soft spots"}
+    assert found(lights=lights[1:]) == usual - {"point lights"}
+    assert found(lights=lights[2:]) == usual - {"point lights", "soft spots"}
+    assert found(media=(SimpleNamespace(phase=SimpleNamespace(is_constant=False)),)) == usual - {"no bounds"}
+    assert found(shape=(6, 2)) == usual
+    assert found(shape=(4, 4)) == usual - {"oblong"} | {"square"}
+    assert found(values=values[:, :1] * np.ones(3)) == usual - {"colours"}
+    assert found(values=np.minimum(values, 1.5)) == usual | {"stop"}
+    for clamped, name in ((True, "clamped layers"), (False, "rising layers")):
+        assert found(height=HeightFog(constant=1.0, clamped=clamped)) == usual - {"even fog"} | {"height fog", name}
