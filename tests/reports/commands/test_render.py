@@ -8,8 +8,10 @@ import pytest
 
 import airlight
 import validation.study.turns
+from analytic.errors import InputError
 from reference.storage.exr import read_exr
 from reports.commands import main as cli
+from validation.study.cost import TIMED
 
 SMALL = ["--size", "8x6"]
 
@@ -100,3 +102,18 @@ def test_open_occluders_are_warned_of_where_planes_have_an_order_of_a_paper(vari
     run("sphere-spot", *SMALL, "--method", "shadow-planes", "--set", "order=paper")
     err = capfd.readouterr().err
     assert err.count("airlight: warning: shape 'floor' is open") == 1
+
+
+def test_a_frame_of_one_ray_a_pixel_has_the_further_layers_of_its_method_and_pays_for_what_it_renders(monkeypatch):
+    """A mean over rays has no layer of a method; frames that are only timed count as work."""
+    asked = []
+
+    def ready(chosen, frames, layers, progress):
+        asked.append((frames, layers))
+        raise InputError("enough")
+
+    monkeypatch.setattr("reports.api.render._ready", ready)
+    for samples, timed in ((1, False), (4, False), (1, True)):
+        with pytest.raises(InputError, match="enough"):
+            airlight.render("open-fog", "unshadowed", samples=samples, timed=timed)
+    assert asked == [(1, True), (4, False), (1 + TIMED, True)]

@@ -11,7 +11,8 @@ from analytic.height_fog import HeightFog
 from reference.scene.read import read_reference
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.engine import faults
-from validation.engine.fault import traits
+from validation.engine.diagnose import _differ, _in_order
+from validation.engine.fault import Fault, Number, traits
 from validation.engine.faults import FAULTS, faults_of
 from validation.fog_model.radiance import Fog
 
@@ -99,3 +100,18 @@ def test_traits_of_a_scene_and_its_image_by_hand():
     assert found(values=np.minimum(values, 1.5)) == usual | {"stop"}
     for clamped, name in ((True, "clamped layers"), (False, "rising layers")):
         assert found(height=HeightFog(constant=1.0, clamped=clamped)) == usual - {"even fog"} | {"height fog", name}
+
+
+def test_pairs_have_faults_of_two_kinds_in_the_order_in_which_they_happen():
+    def fault(kind, *steps):
+        return Fault("name", "words", None, tuple(Number(0.0, 1.0, step=step) for step in steps), kind=kind)
+
+    extinction, curve = fault("medium", 0.0), fault("values")
+    lamp, shift = fault("light", 0.0), fault("camera", 0.1, 0.1)
+    assert _differ(extinction, curve)
+    assert not _differ(curve, fault("values", 0.0))
+    assert not _differ(lamp, shift)  # each shift would need new paths of the changed light
+    assert _differ(shift, extinction)
+    assert _differ(lamp, extinction)
+    assert _in_order(curve, extinction) == _in_order(extinction, curve) == (extinction, curve)
+    assert _in_order(shift, lamp) == (lamp, shift)

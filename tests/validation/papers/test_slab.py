@@ -60,3 +60,10 @@ def test_the_median_of_a_fit_leaves_out_what_is_dim(monkeypatch):
 
     monkeypatch.setattr(slab, "transport_curves", lambda: [curve(fit, exact), curve(exact, 1e-9 * exact)])
     assert slab.transport_figures() == {"fit, median": pytest.approx(20.0)}
+
+
+def test_depths_of_figure_8_lie_in_their_slabs_and_end_at_the_other_side():
+    for thickness, depths in slab.PANELS:
+        assert depths[0] == 0
+        assert depths[-1] == thickness
+        assert list(depths) == sorted(depths)

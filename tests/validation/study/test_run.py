@@ -30,7 +30,7 @@ from validation.study.row import row_values
 from validation.study.run import run
 from validation.study.scene import check_reference, configurations_for, open_scene
 from validation.study.stated_errors import EXACT
-from validation.study.study import Cell, Checks, Measure, Study
+from validation.study.study import Cell, Checks, Measure, RandomScenes, Study
 
 SIZE = (24, 18)
 MARCH = Configuration("ray-march", None, (("steps", 200),))
@@ -304,3 +304,42 @@ def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypa
     assert busy == quiet
     impatient = checked(margins={"volpath": 1e-6}, patience=1.0)
     assert not any(verdict.finished for verdict in impatient.values())
+
+
+def test_a_scene_of_half_has_half_the_width_in_all_its_images_and_more_paths_in_a_batch():
+    checks = Checks(size=(48, 36), samples={"single-scatter": 128, "volpath": 16})
+    study = Study(
+        "s", ("a", "b"), half=("b",), sizes=((40, 30),), measure=Measure(timed_size=(640, 480)), checks=checks
+    )
+    assert study.of("a") == study
+    halved = study.of("b")
+    assert (halved.sizes, halved.measure.timed_size, halved.checks.size) == (((20, 15),), study.timed_size, (24, 18))
+    assert halved.checks.samples == {"single-scatter": 128, "volpath": 64}
+
+
+def test_images_of_a_study_are_each_scene_size_and_medium_and_the_first_are_timed():
+    chosen = (configuration("unshadowed"), configuration("shadow-planes"))
+    study = Study(
+        "s",
+        ("a", "random:4"),
+        random=RandomScenes(count=3, first=3),
+        sizes=((8, 6), (16, 12)),
+        media=((), ("sigma_t=2",)),
+        configurations=chosen,
+        measure=Measure(times="alone"),
+        timed=2,
+    )
+    assert list(study.scene_names()) == ["a", "random:3", "random:4", "random:5"]
+    assert (study.scene_count, study.cells_by_scene) == (4, 8)
+    images = list(study.images())
+    assert len(images) == 4 * 2 * 2
+    assert [cell.chosen for cell in images[0]] == list(chosen)
+    assert [(image[0].scene, image[0].size, image[0].medium) for image in images[:3]] == [
+        ("a", (8, 6), ()),
+        ("a", (8, 6), ("sigma_t=2",)),
+        ("a", (16, 12), ()),
+    ]
+    assert list(study.timed_images()) == images[: 2 * 4]
+    assert list(replace(study, timed=None).timed_images()) == images
+    assert not list(replace(study, measure=Measure(times="with")).timed_images())
+    assert images[0][0].image == images[0][1].image  # which share a reference
