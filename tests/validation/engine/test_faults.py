@@ -6,14 +6,17 @@ from types import SimpleNamespace
 
 import mitsuba as mi
 import numpy as np
+import pytest
 
 from analytic.height_fog import HeightFog
 from reference.scene.read import read_reference
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.engine import faults
-from validation.engine.diagnose import _differ, _in_order
+from validation.engine.diagnose import _PARTS, _Attempt, _differ, _in_order
 from validation.engine.fault import Fault, Number, traits
 from validation.engine.faults import FAULTS, faults_of
+from validation.engine.prediction import Predictor
+from validation.engine.seen import APART
 from validation.fog_model.radiance import Fog
 
 
@@ -115,3 +118,25 @@ def test_pairs_have_faults_of_two_kinds_in_the_order_in_which_they_happen():
     assert _differ(lamp, extinction)
     assert _in_order(curve, extinction) == _in_order(extinction, curve) == (extinction, curve)
     assert _in_order(shift, lamp) == (lamp, shift)
+
+
+def test_a_diagnosis_tells_how_far_it_is_from_nothing_to_all():
+    spans = sorted(_PARTS)
+    assert [begin for begin, _ in spans] + [1.0] == [0.0] + [end for _, end in spans]
+    told = []
+    teller = SimpleNamespace(progress=lambda *words: told.append(words))
+    _Attempt._tell(teller, (0.3, 0.5), 0.25, "extinction")
+    assert told == [(pytest.approx(0.35), "extinction")]
+
+
+def test_pixels_are_paired_with_their_neighbours_in_the_next_columns():
+    def pairs(pixels, width, used):
+        seen = SimpleNamespace(used=np.ones(used, dtype=bool))
+        asked = SimpleNamespace(pixels=np.array(pixels), shape=(3, width), seen=seen)
+        return [each.tolist() for each in Predictor.pairs.func(asked)]
+
+    # All pixels of 3 x 4: none of the last column has a next one.
+    assert pairs(range(12), 4, 12) == [[0, 1, 2, 4, 5, 6, 8, 9, 10], [1, 2, 3, 5, 6, 7, 9, 10, 11]]
+    # Some of many: pixels of the same row, so far apart that their errors are their own.
+    assert pairs([0, 1, APART, APART + 1, 8 - APART, 8], 8, 99) == [[0, 1], [2, 3]]  # 8 is in another row
+    assert pairs([0, 5], 12, 99) == [[], []]

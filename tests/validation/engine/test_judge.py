@@ -13,7 +13,7 @@ from validation.comparison.images import compare_images
 from validation.engine.error_place import error_place
 from validation.engine.hints import find_hints
 from validation.engine.images import EngineImage, measure_image
-from validation.engine.judge import compare_scene, judge, references
+from validation.engine.judge import Verdict, compare_scene, judge, references
 from validation.engine.seen import expected_layer, judged_layer, seen_image
 from validation.estimates.quadrature import reference_error, reference_image, reference_layer, relative_error
 from validation.scenes.loading import load_scene
@@ -294,3 +294,11 @@ def test_one_wrong_block_of_few_is_not_forgiven():
     image = lit.copy()
     image[8:16, 8:16] *= 3
     assert judge(lit, image, find_hints(lit, image), ()).right
+
+
+@pytest.mark.parametrize(
+    ("reasons", "noise", "alone"),
+    [((), 0.08, True), (("one",), 0.08, True), (("one", "two"), 0.08, False), ((), 0.07, False)],
+)
+def test_noise_alone_explains_half_of_the_square_of_the_error_at_least(reasons, noise, alone):
+    assert Verdict(False, reasons, 1, 0.1, noise).noise_alone is alone
