@@ -58,7 +58,7 @@ _PATIENCE = 1.5  # approximate time for the turns of a slow method; one is the l
 _SHARE = 5.0  # times of which `Measure.seconds` is one: frame, surface and airlight, and half as long for each of four
 _BRIEF = 0.2  # on the turns of a method that is timed briefly [s]
 _BRIEF_MOST = 9  # of these turns
-_RECORDED = 1.0  # in a first frame that takes less, its recording takes a part of time and memory that counts [s]
+_RECORDED = 1.0  # in a frame that takes less, its recording takes a part of the time that counts [s]
 _ANCHORS = (
     25  # repetitions of an anchor at an end of a round: 24 tell a change from scatter (`validation.timing.anchored`)
 )
@@ -191,12 +191,12 @@ def _turns(renderer: FrameRenderer, measure: Measure) -> Turns:
     def frame() -> None:
         took.append(timed(lambda: render_frame(renderer))[1].seconds)
 
-    # Its memory is that of a frame which is not recorded, or which is so long that its recording does not count.
-    memory = peak_memory(frame)
-    recorded = took[-1] < _RECORDED
-    if recorded:
-        memory = peak_memory(frame)
+    # The first frame compiles. The second one says what a frame takes, and its memory; of a slow one the first does.
     slow = SLOW if measure.slow is None else measure.slow
+    memory = peak_memory(frame)
+    if took[-1] < slow:
+        memory = peak_memory(frame)
+    recorded = took[-1] < _RECORDED
     in_stages = took[-1] > slow or len(parts(renderer)) > 1
     turn = staged_turn(renderer) if in_stages else whole_turn(renderer)
     if recorded:
