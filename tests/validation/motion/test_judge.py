@@ -11,6 +11,7 @@ from analytic.errors import InputError
 from reference.storage.exr import Image, write_exr
 from validation.columns import plain
 from validation.estimates.quadrature import reference_image
+from validation.motion import judge
 from validation.motion.judge import compare_frames
 from validation.scenes.loading import load_scene
 
@@ -179,3 +180,25 @@ def test_frames_of_two_sizes_are_refused_by_number(lights, tmp_path):
     pattern, file = written(tmp_path, images, changes=changes)
     with pytest.raises(InputError, match=r"frame 5: .*0006.exr has 16 x 24 pixels, the first frame 32 x 24"):
         compare_frames("open-fog", pattern, file)
+
+
+def test_frames_of_a_scene_at_rest_share_a_reference_and_grow_old(variant, tmp_path, monkeypatch):
+    """A camera that moves once: what it uncovers stays recent for some frames, though nothing changes in them."""
+    size, asked = (16, 12), []
+    monkeypatch.setattr(judge, "reference_image", lambda *args, **how: asked.append(1) or reference_image(*args, **how))
+    monkeypatch.setattr(judge, "_RECENT", 2)
+    origin = np.array(load_scene("sphere-spot", size).scene.sensors()[0].world_transform().matrix)[:3, 3].ravel()
+    here, there = ([float(origin[0] + shift), *map(float, origin[1:])] for shift in (0.0, 0.4))
+    scenes = [load_scene("sphere-spot", size, {"camera.origin": tuple(at)}).scene for at in (here, there)]
+    images = [reference_image(scene).airlight for scene in scenes]
+    uncovered = []
+    for rest in (1, 3):
+        frames = [images[0], *rest * [images[1]]]
+        changes = {"camera.origin": [here, *rest * [there]]}
+        asked.clear()
+        found = compare_frames("sphere-spot", *written(tmp_path, frames, changes=changes, pixel="centre"))
+        assert len(asked) == 2
+        assert found.verdict.kind == "exact"
+        uncovered.append(found.masks["disoccluded"].values)
+    assert uncovered[0] > 0
+    assert uncovered[1] == 3 * uncovered[0]  # in the frame itself and the two after it
