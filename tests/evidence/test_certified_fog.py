@@ -108,7 +108,10 @@ def test_corners_are_exact_in_mitsuba(variant):
 
 
 @pytest.mark.claim("certified-fog", tolerance="none: equal digits")
-@pytest.mark.parametrize(("name", "pixel"), SOME.items())
+@pytest.mark.parametrize(
+    ("name", "pixel"),
+    [pytest.param(*each, marks=pytest.mark.slow if each[0] == "near-light" else ()) for each in SOME.items()],
+)
 def test_some_rays_come_out_the_same(certified, name, pixel):
     certificate = json.loads(json.dumps(asdict(certify_pixel(SCENES[name], directions(SCENES[name])[pixel]))))
     assert certificate == certified[name]["pixels"][pixel]

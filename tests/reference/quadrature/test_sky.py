@@ -66,6 +66,7 @@ def test_in_height_fog_it_is_the_exponential_integral(variant, tmp_path):
     close(quadrature_image(reference, plan=PointPlan(most=32)), ALBEDO * RADIANCE[0] * np.array(wanted))
 
 
+@pytest.mark.slow
 @pytest.mark.claim("sky-light", tolerance="six stated standard errors, each 0.5 % of the mean at most")
 def test_in_a_ball_of_fog_it_is_a_mean_over_chords(variant, tmp_path):
     reference = reference_of(tmp_path, HOMOGENEOUS, SKY, BALL.format(RADIUS), camera="")

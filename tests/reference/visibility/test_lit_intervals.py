@@ -58,7 +58,13 @@ PLACES = {
 
 
 @pytest.mark.claim("directional-reference", "exact-shadows")
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize(
+    "place",
+    [
+        pytest.param(each, marks=pytest.mark.slow if each in ("far", "sun overhead", "low sun") else ())
+        for each in PLACES
+    ],
+)
 def test_random_points_by_the_definition(variant, place):
     """Triangles, spheres and disks all around: points far from an edge are lit or not, by a test of each shape."""
     shapes, (light, w) = random_shapes(), PLACES[place]

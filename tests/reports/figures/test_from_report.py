@@ -67,6 +67,7 @@ def report(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.claim("figures-repeat", tolerance="none: equal bytes")
 def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(report, tmp_path):
     """In another process, by the command; and what is embedded are TrueType fonts, no date."""

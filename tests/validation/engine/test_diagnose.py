@@ -238,6 +238,7 @@ def test_what_is_set_wrong_in_an_engine_is_named_or_placed(scenes, number):
     assert said.place == "" or injected == "unexplained"
 
 
+@pytest.mark.slow
 @pytest.mark.claim("diagnosis-engines")
 def test_the_fog_alone_is_too_bright(scenes):
     injected, said = named(scenes, 2)

@@ -114,6 +114,7 @@ def test_a_light_is_found_where_it_is_with_its_shadows(variant, tmp_path):
     assert values == pytest.approx([0.82, 0.17, 1.7, 0.31], rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.claim("fit-confounded")
 def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfaces(variant, tmp_path):
     scene = scene_file(tmp_path)
@@ -134,6 +135,7 @@ def test_albedo_and_intensity_are_not_told_apart_in_the_airlight_but_with_surfac
     assert [each.value for each in whole.parameters] == pytest.approx([0.31, 0.83, 1.0], rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.claim("fit-robust")
 def test_pixels_that_disagree_are_left_out(variant, tmp_path):
     scene = scene_file(tmp_path, albedo="0.83")
