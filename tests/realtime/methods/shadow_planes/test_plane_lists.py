@@ -3,6 +3,7 @@
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import drjit as dr
 import mitsuba as mi
@@ -12,7 +13,7 @@ import pytest
 import realtime.methods.shadow_planes.plane_table as module
 from realtime.errors import InputError
 from realtime.methods.shadow_planes.plane_table import NUMBER, index_planes, light_basis, planes_of_rays
-from realtime.methods.shadow_planes.published_crossings import Buffer, sum_crossings
+from realtime.methods.shadow_planes.published_crossings import Buffer, _entry_key, sum_crossings
 from realtime.methods.shadow_planes.sweep import ray_planes, sum_lit_intervals
 from realtime.numerics.array_types import array_types
 from realtime.numerics.functions import host_diamond_angle
@@ -290,3 +291,14 @@ def test_buffer_clamps_after_every_plane(variant):
     assert np.max(np.abs(rounded - free)) < 1.5 * 3 / 255 + 1e-5
     assert np.all(clamped[lit & ~shadowed] == pytest.approx(0.5))
     assert np.mean(free[shadowed] - clamped[shadowed]) > 0.05
+
+
+def test_the_key_of_an_entry_is_the_angle_at_the_light_and_a_number_along_its_axis_too(variant):
+    """The light is at 0, the camera at D on the z axis; the cosine of a ray along it may exceed 1 by rounding."""
+    x, z, distance = np.array([2.0, 3.0, 1.5, 1.5]), np.array([-0.6, 0.3, 1.0, np.nextafter(np.float32(1), 2)]), 4.0
+    index, ray = SimpleNamespace(distance=mi.Float(distance)), SimpleNamespace(z=mi.Float(z))
+    entry = SimpleNamespace(distance=mi.Float(x))
+    point = np.stack([x * np.sqrt(np.maximum(1 - z**2, 0)), distance + x * z])
+    key = np.array(_entry_key(index, ray, entry, "paper"))
+    np.testing.assert_allclose(key, -point[1] / np.linalg.norm(point, axis=0), rtol=2e-6)  # float32
+    np.testing.assert_allclose(np.array(_entry_key(index, ray, entry, "exact")), distance / x, rtol=1e-6)
