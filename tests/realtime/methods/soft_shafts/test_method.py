@@ -17,7 +17,7 @@ from tests.helpers.lamps import lamp_scene
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from validation.estimates.quadrature import reference_image
 from validation.scenes.loading import load_scene
-from validation.study.configuration import configuration, prepared
+from validation.study.configuration import SHARED_POINTS, configuration, prepared
 
 NONE = {"filter": "none", "surfaces": "ray"}
 
@@ -152,3 +152,11 @@ def test_the_width_of_a_penumbra_follows_from_similar_triangles(variant, ratios)
     width = np.array(penumbra_width(blockers, distance, camera, mi.Float(light), raster, guide=guide))
     pixel = 3.0 * np.linalg.norm(np.array(camera.left).ravel())
     np.testing.assert_allclose(width, light * np.prod(ratios) ** (1 / len(ratios)) / pixel, rtol=1e-4)
+
+
+def test_narrow_penumbrae_of_shared_points_have_the_rest_of_their_groups(variant):
+    """A pixel tests one of 16 light samples, and three more where its penumbra is narrow: 33 % error, 48 % without."""
+    turned = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).rotate([1, 2, 3], 31).scale(0.33)
+    scene = lamp_scene("disk", size=(40, 32), ball={"type": "cube", "to_world": turned})
+    exact = frame(scene, "shadow-planes", points=64, pattern="sobol").surface
+    assert relative_rmse(frame(scene, "soft-shafts", **SHARED_POINTS | {"steps": 4}).surface, exact) < 0.4
