@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: what a method states of its own error holds where rounding and tables are at their worst, and not by far."""
 
+from types import SimpleNamespace
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -121,3 +123,17 @@ def test_the_kinks_of_a_table_are_worth_a_quarter_of_its_bends(words, values):
     assert relative < 3e-6 + kinks
     if words == "murky":
         assert relative > 0.03 * kinks > 1e-5
+
+
+def test_places_where_rounding_is_worst_are_at_equal_angles_about_a_light():
+    """A lamp 3 m ahead and 4 m aside of the first ray, and behind the second, which never ends."""
+    lamp = SimpleNamespace(position=np.array([4.0, 0.0, 3.0]))
+    reference = SimpleNamespace(origin=np.zeros(3), direction=np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]))
+    places = bounds._angles_about(reference, lamp, np.array([6.0, np.inf]))
+    angles = np.arctan2(places - [3.0, -3.0], 4.0)
+    np.testing.assert_allclose(places[[0, -1], 0], [0.0, 6.0], atol=1e-12)
+    np.testing.assert_allclose(np.diff(angles, axis=0)[:, 0], np.ptp(angles[:, 0]) / (len(places) - 1))
+    assert places[0, 1] == pytest.approx(0, abs=1e-12)
+    assert np.isinf(places[-1, 1])  # no place is there
+    assert np.isfinite(places[:-1]).all()
+    assert (np.diff(places[:-1], axis=0) > 0).all()
