@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RECORD = ROOT / "docs/data/numpy-faults.json"
 _SIZE = (64, 48)
 _STEPS = 96
+_FAR = 1e4  # where rays to the sky end [m]: of fog without attenuation 1e-4 of the light lies beyond
 _SIDE = 3  # rays along a side of a pixel
 
 Array = NDArray[np.float64]
@@ -181,7 +182,7 @@ def _layers(engine: Engine, positions: Array) -> tuple[Array, Array, Array]:
     distance = np.minimum(floor, ball)
     hit, point = np.isfinite(distance), ORIGIN + np.where(np.isfinite(distance), distance, 0)[:, None] * way
     flat = way @ axis if engine.planar else 1.0
-    seen = np.where(hit, distance * flat, 80.0)
+    seen = np.where(hit, distance * flat, _FAR)
     last = np.minimum(np.maximum(seen, engine.start), engine.end)
     normal = np.where((ball < floor)[:, None], (point - BALL) / RADIUS, [0, 0, 1.0])
     colour = np.where((ball < floor)[:, None], engine.ball, engine.floor)
@@ -260,7 +261,7 @@ FAULTS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("camera-path", "the way to the camera not attenuated", {"segments": (0.0, 1.0)}),
     ("near-plane", "no fog before 0.5 m", {"start": 0.5}),
     ("fog-end", "no fog beyond 6 m", {"end": 6.0}),
-    ("depth-axis", "depth along the axis", {"planar": True}),
+    ("right", "depth along the axis: less than the comparison sees", {"planar": True}),
     ("height-fog", "density falls to 1/e in 1.1 m", {"layer": (0.0, 1.1)}),
     ("distance-law", "one over the distance", {"power": 1.0}),
     ("light-range", "lights end at 5 m", {"reach": 5.0}),
