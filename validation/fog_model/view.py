@@ -353,7 +353,8 @@ def _level(places: Places, light: ReferenceLight, sphere: Source, centre: Array)
         whole = 1 / r**2
         sent *= (r[:, None] - (place / r[:, None]) @ starts.T) / d
     else:
-        whole = 2 * (1 - np.sqrt(1 - np.minimum(radius / r, 1.0) ** 2)) / radius**2
+        # The solid angle over pi R^2, written without a difference that far away is nothing.
+        whole = 2 / (np.maximum(r, radius) ** 2 * (1 + np.sqrt(1 - np.minimum(radius / r, 1.0) ** 2)))
     return np.asarray(4 * sent.mean(axis=1) / whole)
 
 
