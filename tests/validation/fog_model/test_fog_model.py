@@ -2,15 +2,16 @@
 """The fog model: radiance from paths is that of the reference, whatever the lights and media, and laws are its own."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
+from reference.scene.read import ReferenceLight, read_reference
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
 from validation.fog_model.radiance import FogModel, scene_fog
-from validation.fog_model.view import scattering_paths, view_of
+from validation.fog_model.view import _level, scattering_paths, view_of
 from validation.scenes.loading import load_scene
 
 SIZE = (24, 18)
@@ -86,3 +87,20 @@ def test_laws_can_be_changed_one_by_one(variant):
         ({"exposure": (3.0, 1.0, 1.0)}, 3 * right[:, 0]),
     ):
         assert model.layers(replace(fog, **law))[0][:, 0] == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("radius", [1e-9, 1e-3, 0.3])
+def test_even_samples_of_a_sphere_give_its_light_however_small_and_far_it_is(radius):
+    """By even normals: 2000 samples are the light of the sphere to 1 %, also where its solid angle is 1e-20 sr."""
+    count = np.arange(2000) + 0.5
+    z, turn = 1 - count / 1000, np.pi * (1 + np.sqrt(5)) * count
+    normals = np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=1)
+    lights = [ReferenceLight(radius * normal, np.ones(3), axis=normal) for normal in normals]
+    r = np.array([1.0, 40.0, 1e4])
+    # Distance and direction from each place to the first sample.
+    way = lights[0].position - r[:, None] * np.array([0.6, 0.0, 0.8])
+    length = np.linalg.norm(way, axis=1)
+    for surface in (False, True):
+        places = SimpleNamespace(r=length, towards=-way / length[:, None], is_surface=surface)
+        level = _level(places, lights[0], SimpleNamespace(lights=lights), np.zeros(3))
+        assert level == pytest.approx(1.0, rel=1e-2)
