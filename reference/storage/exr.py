@@ -27,6 +27,8 @@ from reference.storage.files import NO_SPACE, atomic_path
 
 TOTAL = "total"  #: the layer in the plain channels R, G, B
 NOTE = "airlight:read"  #: the attribute in which the reader says what it changed or left out
+BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
+BOUND = "airlight:bound"  #: header attribute: of what kind the error in the layer `<layer>_bound` is
 
 Attribute = str | int | float
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analytic.errors import InputError
-from reference.storage.exr import NOTE, TOTAL, Image, layer_names, read_exr
+from reference.storage.exr import BATCHES, BOUND, NOTE, TOTAL, Image, layer_names, read_exr
 from reference.storage.exr import layer as image_layer
 from validation.arrays import Array, Bools
 from validation.columns import columns_of, shown_values
@@ -26,8 +26,6 @@ from validation.statistics.estimate import Answer, Estimate, Kind
 from validation.statistics.records import Statistics
 
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
-BATCHES = "airlight:batches"  #: header attribute: how many batch means gave the standard errors
-_BOUND = "airlight:bound"  # header attribute: of what kind the error in the layer `<layer>_bound` is
 
 
 @dataclass(frozen=True)
@@ -227,9 +225,9 @@ def _stated_errors(named: Sequence[tuple[str, Image]], layer: str, mask: Any) ->
 def _stated(path: str, image: Image, values: Array, bound: Array) -> Estimate:
     """Return the mean of the compared pixels of one image, and the mean of their errors by its file."""
     kinds: dict[Any, Kind] = {"proven": "proven", "estimated": "estimated"}
-    said = image.attributes.get(_BOUND, "estimated")
+    said = image.attributes.get(BOUND, "estimated")
     if said not in kinds:
-        raise InputError(f"{path} has the attribute {_BOUND} {said!r}; expected {' or '.join(kinds)}; correct it")
+        raise InputError(f"{path} has the attribute {BOUND} {said!r}; expected {' or '.join(kinds)}; correct it")
     if not (values.size and np.isfinite(bound).all() and (bound >= 0).all()):
         return Estimate(float(values.mean()) if values.size else None, None, kinds[said])
     rounding = float(np.finfo(np.result_type(values, np.float32)).eps) / 2

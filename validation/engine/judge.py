@@ -31,13 +31,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
 from reference.quadrature.ray_values import ReferenceImage
 from reference.quadrature.replicates import REPLICATES
 from reference.scene.read import read_reference
-from reference.storage.exr import NOTE, TOTAL, Image, read_exr
+from reference.storage.exr import BATCHES, NOTE, TOTAL, Image, read_exr
 from validation.arrays import Array, Bools, Progress
-from validation.comparison.images import BATCHES, Comparison, compare_images, read_mask
+from validation.comparison.images import Comparison, compare_images, read_mask
 from validation.engine.error_place import ErrorPlace, error_place
 from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
 from validation.engine.seen import (
@@ -62,7 +61,7 @@ from validation.estimates.quadrature import (
 )
 from validation.metrics.errors import FLOOR
 from validation.scenes.loading import LoadedScene
-from validation.statistics.comparison import block_sums
+from validation.statistics.comparison import block_sums, check_margin
 from validation.statistics.estimate import Estimate
 
 ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
@@ -198,8 +197,7 @@ def judge_image(
     computes its reference for 'centre' or 'area'; `mask`: which pixels are compared, (height, width); all by default;
     `metrics`: more for `validation.comparison.images.compare_images`.
     """
-    if margin is not None and not 0 < margin < math.inf:
-        raise InputError(f"margin: got {margin}, expected a relative bias above 0, such as 0.005")
+    check_margin(margin)
     kinds = pixel_kinds(image, pixel)
     if mask is not None and np.shape(mask) == judged.values.shape[:2]:
         judged = replace(judged, values=np.where(np.asarray(mask)[:, :, None], judged.values, np.nan))

@@ -32,7 +32,7 @@ from reference.quadrature.replicates import REPLICATES
 from reference.quadrature.surface import surface_hits
 from reference.scene.clouds import read_clouds
 from reference.scene.read import ReferenceScene, read_reference
-from reference.storage.exr import Image
+from reference.storage.exr import BATCHES, BOUND, Image
 from reference.storage.scene_digest import scene_digest
 from validation.arrays import Array, Bools, Progress
 from validation.estimates.agreement import MASK_PIXELS, pixel_angle
@@ -77,9 +77,9 @@ def layered_reference(loaded: LoadedScene, reference: ReferenceImage, *, pixel: 
     layers |= {layer: values for layer, values in extent.items() if values is not None}
     made: dict[str, str | int | float] = {"airlight:scene": loaded.name, "airlight:estimator": "quadrature"}
     made |= {"airlight:pixel": pixel, **_digest_of(loaded)}
-    made["airlight:bound"] = reference.bound_kind
+    made[BOUND] = reference.bound_kind
     if reference.airlight_se is not None:
-        made["airlight:batches"] = REPLICATES
+        made[BATCHES] = REPLICATES
     return Image(layers, reference.distance, made)
 
 
