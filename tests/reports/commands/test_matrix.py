@@ -187,7 +187,7 @@ def rendered(path: Path, method: str) -> Path:
 
 
 def compared(path: Path, reference: Path, frame: Path) -> None:
-    ignore = r"95 %|\d+ % power|\d+ % level|over \d+ %|the worst \d+ %|known to \S+ of its mean"
+    ignore = r"(?<![\d.])(95 %|\d+ % power|\d+ % level)|over \d+ %|the worst \d+ %|known to \S+ of its mean"
     text, data = same_numbers(path.parent, "compare", reference, frame, ignore=ignore)
     assert f"relative {100 * data['metrics']['relative_rmse']:.4g} %" in text
     text, data = same_numbers(path.parent, "compare", path, frame, "--pixel", "centre", ignore=ignore)

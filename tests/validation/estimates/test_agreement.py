@@ -120,8 +120,12 @@ def test_the_time_of_the_pilot_does_not_count(scene, own_cache, monkeypatch):
         now += 100.0 if first_seed else 0.0
         return monte_carlo_batches(scene, estimator, first_seed=first_seed, **options)
 
+    def watch():
+        begun = now
+        return lambda: SimpleNamespace(seconds=now - begun)
+
     monkeypatch.setattr(agreement_module, "monte_carlo_batches", traced)
-    monkeypatch.setattr(agreement_module, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(agreement_module, "stopwatch", watch)
     verdicts = agreement(scene, margin=1e-7, batches=9, samples=4, seconds=50.0)
     assert now == 100.0
     assert {verdict.batches for verdict in verdicts.values()} == {9}
