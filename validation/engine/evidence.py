@@ -16,7 +16,7 @@ less log(n/A)/2 for each number (Schwarz 1978, Ann. Statist. 6, 461), is the evi
 measured by `docs/tools/calibrate_diagnosis.py`, on right images with the errors that engines have and on faulty ones.
 
 **Noise.** An explanation leaves noise if A is 1 at most, within two standard errors of it for independent pixels,
-sqrt(2/blocks). Of normal noise alone one image in thirty is beyond: A is then a mean over blocks of chi-squares.
+sqrt(2/blocks). One image in thirty of normal noise alone is beyond: A is then a mean over blocks of chi-squares.
 """
 
 import json
