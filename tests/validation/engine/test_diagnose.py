@@ -2,6 +2,7 @@
 """Diagnoses name the fault that is injected, alone, with another, or none; also one in a renderer in NumPy."""
 
 import importlib
+import itertools
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -99,10 +100,15 @@ def test_few_pixels_tell_no_fault_from_noise(variant):
         diagnosed(np.full((3, 4, 3), 0.02), size=(4, 3))
 
 
+def all_blocks(height, width):
+    """Return the blocks of an image all of whose pixels are looked at."""
+    return Blocks.of(SimpleNamespace(shape=(height, width), pixels=np.arange(height * width)))
+
+
 def test_pixels_that_share_their_errors_count_as_fewer(reference):
     """White noise has as many witnesses as pixels; errors of 4 x 4 pixels each have a sixteenth."""
     (height, width), generator = (192, 256), np.random.default_rng(2)
-    blocks = Blocks.of(SimpleNamespace(shape=(height, width), pixels=np.arange(height * width)))
+    blocks = all_blocks(height, width)
     lit = np.ones((height * width, 3), bool)
 
     def explanation(errors):
@@ -222,18 +228,19 @@ def scenes(variant, tmp_path_factory):
     return {engine: scene(engine) for engine in (numpy_faults.RIGHT, numpy_faults.LAYERED)}
 
 
-def is_like_noise(errors):
-    """Return whether relative errors (height, width, 1) of all channels are independent, as the diagnosis sees it."""
-    pixels = errors.size
-    blocks = Blocks.of(SimpleNamespace(shape=errors.shape[:2], pixels=np.arange(pixels)))
-    every = np.repeat(errors.reshape(pixels, 1), 3, axis=1)
-    return blocks.is_noise(SimpleNamespace(errors=every, lit=np.ones((pixels, 3), bool)))
+def usual_seed(noise, number):
+    """Return a seed whose noise the diagnosis takes for noise; of one draw in thirty it says that more is left."""
+    for seed in itertools.count(number, len(numpy_faults.CASES)):
+        errors = np.repeat(numpy_faults.relative_noise(noise, seed), 3, axis=2)
+        alone = SimpleNamespace(errors=errors.reshape(-1, 3), lit=np.ones((errors[..., 0].size, 3), bool))
+        if all_blocks(*errors.shape[:2]).is_noise(alone):
+            return seed
 
 
 def named(scenes, number, noise=0.01):
     engine, injected, _, given = numpy_faults.CASES[number]
     loaded, light = scenes[engine]
-    image = numpy_faults.rendered(replace(engine, **given), area=False, noise=noise, seed=number)
+    image = numpy_faults.rendered(replace(engine, **given), area=False, noise=noise, seed=usual_seed(noise, number))
     return injected, diagnose_image(Image({"total": image}), loaded, light=light)
 
 
@@ -243,8 +250,7 @@ def named(scenes, number, noise=0.01):
 def test_what_is_set_wrong_in_an_engine_is_named_or_placed(scenes, number):
     injected, said = named(scenes, number)
     assert said.first == injected, [row.words for row in said.ranked]
-    # Noise alone is beyond two standard errors in some draws: the diagnosis then says that more is left.
-    assert said.place == "" or injected == "unexplained" or not is_like_noise(numpy_faults.relative_noise(0.01, number))
+    assert said.place == "" or injected == "unexplained"
 
 
 @pytest.mark.slow
