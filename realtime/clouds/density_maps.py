@@ -102,7 +102,7 @@ def light_depths(
     def full_step(total, x, number):
         return stride * voxel(clouds, number)
 
-    def widen(total, begin, end, number):
+    def widen(total, begin, end, inside, number):
         first, last = total
         there = (number == cloud) & (middle_density(clouds, origin, direction, begin, end, number) > 0)
         return (dr.select(there, dr.minimum(first, begin), first), dr.select(there, end, last)), mi.Bool(True)
@@ -118,7 +118,7 @@ def light_depths(
         ahead = first + (last - first) * dr.square(Float(layer + 1) / LAYERS) - x
         return dr.minimum(dr.maximum(ahead, 0), full_step(total, x, number))
 
-    def add(total, begin, end, number):
+    def add(total, begin, end, inside, number):
         layer, length = total
         own = number == cloud
         rho = middle_density(clouds, origin, direction, begin, end, number)
@@ -197,7 +197,7 @@ def dense_surface(
     def step(total, x, cloud):
         return stride * voxel(clouds, cloud)
 
-    def add(total, begin, finish, cloud):
+    def add(total, begin, finish, inside, cloud):
         distance, number, behind = total
         own = mi.Bool(True) if only is None else cloud == only
         searches = own & ~dr.isfinite(distance)

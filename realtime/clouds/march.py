@@ -12,6 +12,10 @@ sum over the stretches is right to the rounding of a distance.
 Rays are cast in float32, from the last crossing on. A stretch that is shorter than the step beyond it, 4e-6 of the
 distance and of the coordinates, is not seen.
 
+The ends of a stretch lie on a boundary, and rounding decides on which side of it. What is looked up there, such as the
+depth to a light that shines along the boundary, jumps from one side to the other. It is looked up as far inside the
+stretch as a crossing is stepped over: in the cloud that the stretch lies in.
+
 **Steps of rays through clouds, and optical depths.**
 
 A step of the length dx has the density in its middle, rho, and the depth kappa rho dx: the midpoint rule, whose error
@@ -115,8 +119,7 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
     than `x`.
     """
     Float = type(x)
-    size = dr.maximum(dr.maximum(dr.abs(origin.x), dr.abs(origin.y)), dr.abs(origin.z))
-    begin = dr.select(x > 0, x + _STEP * (x + size), 0)
+    begin = dr.select(x > 0, x + _clearance(origin, x), 0)
     start = mi.Point3f(origin + direction * begin)
     # Camera rays and segments side by side start close together and go alike: told so, Embree takes a third of the
     # time.
@@ -134,6 +137,12 @@ def next_crossing(surfaces: CloudSurfaces, origin, direction, x, active=True) ->
         cloud,
         normal,
     )
+
+
+def _clearance(origin, x) -> Metres:
+    """Return how far from a boundary at a distance a point is on one side of it for certain [m]."""
+    size = dr.maximum(dr.maximum(dr.abs(origin.x), dr.abs(origin.y)), dr.abs(origin.z))
+    return _STEP * (x + size)
 
 
 SPREAD = 2.0  #: s
@@ -158,10 +167,10 @@ def march(
 
     `surfaces`: the boundaries of clouds; `origin`, `direction`, `end`: rays [m], their unit directions, and where they
     end, may be infinite [m]; `total`: the sum of no step, a tuple of arrays of the rays' width; `step`: (total,
-    distance [m], cloud) -> how long a step may be [m]; `add`: (total, begin, end, cloud) -> total, and whether to go
-    on, for steps [m] in the cloud of a number: the first in a stretch has no length, and says where it begins;
-    `active`: lanes to compute; `first`: the first crossing, if it is known. The loop changes no other lanes than those
-    that go on.
+    distance [m], cloud) -> how long a step may be [m]; `add`: (total, begin, end, inside, cloud) -> total, and whether
+    to go on, for steps [m] in the cloud of a number: the first in a stretch has no length, and says where it begins;
+    `inside` is `end`, moved off a boundary into the stretch; `active`: lanes to compute; `first`: the first crossing,
+    if it is known. The loop changes no other lanes than those that go on.
     """
     Float, lanes = type(direction.x), max(dr.width(direction), dr.width(origin))
 
@@ -176,7 +185,10 @@ def march(
     def body(x, edge, cloud, opens, total, going):
         longest = dr.maximum(step(total, x, cloud), _SHORTEST * x)
         target = dr.select(opens, x, dr.minimum(x + longest, edge))
-        total, goes_on = add(total, x, target, cloud)
+        clear = _clearance(origin, target)
+        entered = dr.minimum(target + clear, 0.5 * (target + edge))
+        leaving = dr.select(target < edge, target, dr.maximum(target - clear, 0.5 * (x + target)))
+        total, goes_on = add(total, x, target, dr.select(opens, entered, leaving), cloud)
         opens = goes_on & ~opens & (target >= edge) & (edge < end)
         x, edge, cloud = dr.if_stmt(
             args=(target, edge, cloud), cond=opens, true_fn=lambda x, *_: stretch(x), false_fn=lambda *same: same
@@ -229,7 +241,7 @@ def depths_along(
         length = stride * voxel(clouds, cloud) if clouds.density is not None else dr.inf
         return length * dr.exp(dr.minimum(least(depths), OPAQUE) / SPREAD) if seen else length
 
-    def add(depths, begin, finish, cloud):
+    def add(depths, begin, finish, inside, cloud):
         length = (finish - begin) * middle_density(clouds, origin, direction, begin, finish, cloud)
         depths = tuple(
             dr.fma(dr.gather(Float, own, cloud), length, depth) for own, depth in zip(clouds.sigma_t, depths)

@@ -155,9 +155,9 @@ def light_once(
         node = dr.select((part < 1) & (kappa > 0), ahead / kappa, dr.inf)
         return node if clouds.density is None else dr.minimum(node, stride * voxel(clouds, cloud) * growth)
 
-    def add(total, begin, end, cloud):
+    def add(total, begin, end, inside, cloud):
         depths, segments, lit, sums = total
-        next_segments, next_lit = reaching(rays, beams, end)
+        next_segments, next_lit = reaching(rays, beams, inside)
         length = (end - begin) * middle_density(clouds, rays.origin, rays.direction, begin, end, cloud)
         own = tuple(dr.gather(Float, sigma_t, cloud) * length for sigma_t in clouds.sigma_t)
         after = tuple(depth + part for depth, part in zip(depths, own))
@@ -184,7 +184,7 @@ def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, directio
     """
     Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
 
-    def add(total, begin, finish, cloud):
+    def add(total, begin, finish, inside, cloud):
         first, sums = total
         rho = middle_density(clouds, origin, direction, begin, finish, cloud)
         kappas = [dr.gather(Float, sigma_t, cloud) * rho for sigma_t in clouds.sigma_t]

@@ -121,14 +121,38 @@ def _moved_mesh(mesh: Any, matrix: Array, scale: float) -> Any:
     parameters = mi.traverse(mesh)
     points = np.reshape(parameters["vertex_positions"], (-1, 3)).astype(np.float64)
     points = points @ matrix[:3, :3].T + matrix[:3, 3]
+    medium = mesh.interior_medium()
+    if medium is not None and medium.class_name() == "HeterogeneousMedium":
+        corners = np.reshape(parameters["faces"], (-1, 3))
+        return medium_boundary(mesh.id(), (points, corners), _moved_grid(medium, matrix, scale))
     parameters["vertex_positions"] = mi.Float(points.astype(np.float32).ravel())
     parameters.update()
-    medium = mesh.interior_medium()
     if medium is not None:
         inside = mi.traverse(medium)
         inside["scale"] = float(inside["scale"]) / scale
         inside.update()
     return mesh
+
+
+def _moved_grid(medium: Any, matrix: Array, scale: float) -> Description:
+    """Return a medium of a density grid, moved: the place of a grid is no parameter, and it is made again."""
+    inside = mi.traverse(medium)
+    box = next(part for part in inside.hierarchy if part.class_name() == "GridVolume").bbox()
+    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (box.min, box.max))
+    place = np.diag([*(high - low), 1.0])
+    place[:3, 3] = low
+    return {
+        "type": "heterogeneous",
+        "sigma_t": {
+            "type": "gridvolume",
+            "grid": mi.VolumeGrid(np.array(inside["sigma_t.data"])),
+            "to_world": mi.ScalarTransform4f(matrix @ place),
+        },
+        "scale": float(inside["scale"]) / scale,
+        "has_spectral_extinction": medium.has_spectral_extinction(),
+        "albedo": {"type": "rgb", "value": np.ravel(inside["albedo.value.value"]).tolist()},
+        "phase": medium.phase_function(),
+    }
 
 
 def behind_camera(scene: Description, distance: float) -> Array:

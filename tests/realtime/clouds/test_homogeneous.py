@@ -11,6 +11,7 @@ from realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opac
 from realtime.numerics.array_types import aligned_array
 from realtime.scene.read_scene import read_scene
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
+from validation.scenes.meshes import box, placed
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -153,6 +154,38 @@ def test_order_one_with_64_steps(few):
     origin, direction, expected = few
     (radiance,) = marched(loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED)), origin, direction, steps=64)
     assert np.sqrt(np.mean((radiance - expected) ** 2)) < 0.005 * expected.mean()
+
+
+WALLS, GAP = ([-20.0, -13.0, -9.0], [30.0, 16.0, 14.0]), 0.002  # of a box of droplets, and another beside it [m]
+
+
+@pytest.mark.claim("cloud-single-scattering", tolerance="rounding of the places, 1e-4")
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (-0.6, 0.8, 0.0), (0.28, -0.96, 0.0)])
+def test_light_along_a_wall_is_that_within_the_cloud(direction):
+    """Rays enter and leave by walls that a sun at the zenith shines along: on either side is another segment.
+
+    On a level ray the segment is the same everywhere, so that one step is exact.
+    """
+    low, high = np.array(WALLS)
+    size, middle, aside = high - low, (low + high) / 2, np.array([GAP + WALLS[1][0] - WALLS[0][0], 0, 0])
+    boxes = {
+        name: cloud(name, placed(box(size), middle + place), COLOURED)
+        for name, place in (("cloud", 0 * aside), ("beside", aside))
+    }
+    scene = loaded(sun=SUN | {"direction": [0.0, 0.0, -1.0]}, **boxes)
+    # Rays lie side by side: where rounding has a wall differs from one to the next.
+    across, along = np.array([-direction[1], direction[0], 0.0]), np.array(direction)
+    start = np.array([*middle[:2], 2.3]) - 61.7 * along + np.linspace(-9, 9, 40)[:, None] * across
+    (radiance,) = marched(scene, start, np.tile(along, (len(start), 1)), steps=1)
+    level = along[:2] != 0
+    length = np.zeros(len(start))
+    for place in (0 * aside, aside):
+        ends = (np.array([low, high])[:, None] + place - start)[..., :2][..., level] / along[:2][level]
+        length += np.maximum(ends.max(axis=0).min(axis=1) - ends.min(axis=0).max(axis=1), 0)
+    depth = SIGMA * length[:, None]
+    expected = ALBEDO * -np.expm1(-depth) * np.exp(-SIGMA * (high[2] - 2.3)) / (4 * np.pi)
+    assert np.min(length) > 20
+    assert radiance == pytest.approx(expected, rel=1e-4)
 
 
 def opacity(surfaces, clouds, *rays):

@@ -24,7 +24,10 @@ Rules say what rounding and a method's discretisation allow:
 - *Froxels* end where the light of the farthest lamp fades: lights add up between grids with the same end.
 - *A draw* of one light in many is right in the mean alone: a noisy method is asked nothing of sums.
 - *A map of a light at infinity* spans all media: it is asked nothing of a body far away, which makes its texels wide.
-- *Grids* lie along the axes of the world, and are turned by a right angle; height fog about the vertical.
+  So do the maps of how much of a cloud lies before a sun: a body 320 m behind `cumulus-detail` changes its image by
+  5e-4 with 256 texels on a side, 1e-4 with 512 and 2e-5 with 1024.
+- *Grids* lie along the axes of the world, and are turned by a right angle; height fog about the vertical. The grid of a
+  cloud is moved without a turn where a method looks it up in a map whose texels have one size.
 """
 
 import tomllib
@@ -112,6 +115,16 @@ def sunlit_maps(scene: str, method: str) -> bool:
     return has_maps(method) and any(light["type"] == "sun" for light in TABLES[scene]["lights"])
 
 
+def has_grid(scene: str) -> bool:
+    """Return whether a scene has a grid of densities."""
+    return "smoke" in TABLES[scene].get("fog", {}) or has_cloud_grid(scene)
+
+
+def has_cloud_grid(scene: str) -> bool:
+    """Return whether a cloud of a scene has a grid of densities: its suns have maps of how much lies before a point."""
+    return any("density" in shape.get("medium", {}) for shape in TABLES[scene].get("shapes", ()))
+
+
 # Relations ------------------------------------------------------------------------------------------------------------
 
 
@@ -142,8 +155,11 @@ def moved(scene: str, method: str) -> None:
     fog = TABLES[scene].get("fog", {})
     turn = np.eye(4)
     turn[:3, 3] = MOVE
-    squarely = has_maps(method) or "smoke" in fog
-    turn[:3, :3] = rotation((0, 0, 1) if squarely or "layers" in fog else (1, 2, 3), 90.0 if squarely else 37.0)
+    squarely = has_maps(method) or has_grid(scene)
+    angle = 90.0 if squarely else 37.0
+    if has_cloud_grid(scene) and not has_maps(method):
+        angle = 0.0  # its texels have one size, and nothing says how wrong they are
+    turn[:3, :3] = rotation((0, 0, 1) if squarely or "layers" in fog else (1, 2, 3), angle)
     got = image(changes.moved(changes.description(scene), turn), method)
     before = plain(scene, method)
     if has_maps(method):
@@ -200,7 +216,7 @@ def holds(relation: str, scene: str, method: str) -> bool:
     if relation == "two_lights":
         return not METHODS[method]().noisy
     if relation == "bounds":
-        return "fog" not in TABLES[scene] and not sunlit_maps(scene, method)
+        return "fog" not in TABLES[scene] and not sunlit_maps(scene, method) and not has_grid(scene)
     return True
 
 
@@ -227,6 +243,7 @@ QUICK = {
     ("meadow", "unshadowed"): ("moved", "two_lights"),
     ("smoke", "ray-march"): ("moved",),
     ("cloud-slab", "cloud-octaves"): ("two_lights", "moved"),
+    ("step-cloud", "cloud-octaves"): ("moved",),
     ("cloud-slab", "cloud-collectors"): ("twice_the_lengths", "twice_the_light"),
 }
 

@@ -18,7 +18,7 @@ from validation.engine.prediction import Guess, Predictor, SceneLight
 from validation.engine.seen import Seen
 from validation.estimates.quadrature import reference_image
 from validation.fit.fit import fit_image
-from validation.fit.solve import Model, best_start, interval_ends, robust_fit, weighted_fit
+from validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
 from validation.fit.unknowns import read_unknowns
 from validation.scenes.loading import load_scene
 
@@ -175,7 +175,7 @@ def test_intervals_cover_the_reference_as_often_as_they_say(variant, tmp_path, n
             "skewed": lambda: clean * generator.gamma(25.0, 0.04, (count, 1)),
         }[noise]()
         model = Model.of(Predictor(replace(predictor.seen, values=noisy), predictor.light), unknowns)
-        solution = weighted_fit(model, robust_fit(model, best_start(model)))
+        solution = weighted_fit(model, robust_fit(model, wanted))
         low, high = interval_ends(model, solution).T
         covered += (low < wanted) & (wanted < high)
     # Of 200 trials 190 should cover; the binomial distribution with 0.95 gives fewer than 177 once in 16 000, of which

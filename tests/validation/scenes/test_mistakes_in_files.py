@@ -52,6 +52,8 @@ MISTAKES = {
     ),
     "no number": (scene(scale=""), "value of <float> in line 3 is empty; expected a number"),
     "an unset parameter": (scene(radius="$r"), '<default name="r" value="..."/>'),
+    "an infinite extinction": (scene(sigma_t="inf, 0.2, inf"), "sigma_t is inf, 0.2, inf; expected finite numbers"),
+    "a ball of any size": (scene(radius="1e30"), "'ball': to_world has 1e.30.*expected finite numbers of at most"),
     "no version": (scene().replace(' version="3.0.0"', ""), 'expected <scene version="3.0.0">'),
     "an id twice": (scene(extra='<shape type="cube" id="ball"/>'), 'duplicate ID: "ball".*expected ids that differ'),
     "an unknown plugin": (scene(extra='<shape type="teapot"/>'), '"teapot" not found; expected a plugin of Mitsuba'),

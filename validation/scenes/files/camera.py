@@ -39,7 +39,9 @@ def clip_notes(scene: Any) -> list[str]:
     # Depths of all shapes along the camera's axis, by the corners of their box.
     box, matrix = scene.bbox(), camera_matrix(sensor)
     ends = np.array([np.ravel(box.min), np.ravel(box.max)], dtype=np.float64)
-    corners = np.array(np.meshgrid(*ends.T)).reshape(3, 8).T if box.valid() else np.empty((0, 3))
+    if not np.all(np.isfinite(ends)):  # an empty scene, or a place that `check_numbers` refuses
+        ends = np.empty((0, 3))
+    corners = np.array(np.meshgrid(*ends.T)).reshape(3, -1).T
     depth = (corners - matrix[:3, 3]) @ matrix[:3, 2]
     # Optical depths of a medium around the camera; a box of fog around it ends within the box of all shapes.
     medium = sensor.get_medium()

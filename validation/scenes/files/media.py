@@ -51,6 +51,9 @@ def give_extinction(state: Any) -> list[str]:
 
 def _set_extinction(props: Any, sigma_t: Array) -> None:
     """Set an extinction, (3,): Mitsuba takes it for a reflectance, from 0 to 1; what is above goes into the scale."""
+    if not np.all(np.isfinite(sigma_t)):
+        given = ", ".join(f"{value:g}" for value in sigma_t)
+        raise InputError(f"medium '{props.id()}': sigma_t is {given}; expected finite numbers [1/m]")
     above = max(1.0, float(sigma_t.max()))
     props["scale"] = float(props.get("scale", 1.0)) * above
     props["sigma_t"] = mi.ScalarColor3d(*(sigma_t / above).tolist())
