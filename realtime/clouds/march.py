@@ -12,9 +12,9 @@ sum over the stretches is right to the rounding of a distance.
 Rays are cast in float32, from the last crossing on. A stretch that is shorter than the step beyond it, 4e-6 of the
 distance and of the coordinates, is not seen.
 
-The ends of a stretch lie on a boundary, and rounding decides on which side of it. What is looked up there, such as the
-depth to a light that shines along the boundary, jumps from one side to the other. It is looked up as far inside the
-stretch as a crossing is stepped over: in the cloud that the stretch lies in.
+The ends of a stretch lie on a boundary, and rounding decides on which side of it. A light that shines along a boundary
+reaches either side by another depth. Depths at an end are therefore looked up inside the stretch, as far from the
+boundary as that step: there the point lies in the cloud of the stretch for certain.
 
 **Steps of rays through clouds, and optical depths.**
 

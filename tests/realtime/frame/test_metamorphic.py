@@ -24,8 +24,8 @@ Rules say what rounding and a method's discretisation allow:
 - *Froxels* end where the light of the farthest lamp fades: lights add up between grids with the same end.
 - *A draw* of one light in many is right in the mean alone: a noisy method is asked nothing of sums.
 - *A map of a light at infinity* spans all media: it is asked nothing of a body far away, which makes its texels wide.
-  So do the maps of how much of a cloud lies before a sun: a body 320 m behind `cumulus-detail` changes its image by
-  5e-4 with 256 texels on a side, 1e-4 with 512 and 2e-5 with 1024.
+  The maps of how much of a cloud lies before a sun do so, too: a body 320 m behind `cumulus-detail` changes its image
+  by 5e-4 with 256 texels on a side, 1e-4 with 512 and 2e-5 with 1024.
 - *Grids* lie along the axes of the world, and are turned by a right angle; height fog about the vertical. The grid of a
   cloud is moved without a turn where a method looks it up in a map whose texels have one size.
 """
