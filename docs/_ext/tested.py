@@ -65,4 +65,5 @@ def last_run() -> str:
     words = (
         f"{run['passed']} passed, {run['failed']} failed, {run['skipped']} skipped in {run['seconds'] / 60:.0f} minutes"
     )
-    return f"{run['date'][:10]}, commit {run['commit']}, {run['machine']}: {words}."
+    compiled = f"kernels compiled {'quickly' if run.get('compilation') == 'quick' else 'in full'}"
+    return f"{run['date'][:10]}, commit {run['commit']}, {run['machine']}, {compiled}: {words}."

@@ -20,8 +20,9 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
     The fast tests compile kernels quickly, unless AIRLIGHT_COMPILATION=full asks for what everything else runs. Images
     are the same bit for bit.
 
-    `--all` without arguments for pytest writes the date, the machine and the counts into docs/data/full_run.json, and
-    fails if a test was skipped for a reason that .ci/skips does not allow. Exit status 1 if anything failed.
+    `--all` without arguments for pytest writes the date, the machine, how kernels were compiled and the counts into
+    docs/data/full_run.json. It fails if a test was skipped for a reason that .ci/skips does not allow. Exit status 1 if
+    anything failed.
 
     Parameters
     ----------
@@ -65,6 +66,7 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
     """Run all tests, write the record, and return the exit status."""
     from analytic.clock import stopwatch
     from reference.storage.files import temporary_folder, write_text
+    from reports.machine import quick_compilation
     from reports.machine.environment import describe_environment, machine_in_words
 
     took = stopwatch()
@@ -80,6 +82,7 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
     record = {
         "date": time.strftime("%Y-%m-%d %H:%M:%S %z"),
         "machine": machine_in_words(describe_environment() | {"variant": variant}),
+        "compilation": "quick" if quick_compilation.is_asked_for() else "full",
         "commit": _commit(),
         "seconds": round(took().seconds),
         "passed": tests - failed - errors - skipped,

@@ -101,6 +101,7 @@ def test_a_run_of_all_tiers_is_recorded_with_its_commit_and_counts(
 
     monkeypatch.setattr(command, "subprocess", SimpleNamespace(run=run))
     monkeypatch.setattr(command, "RECORD", str(tmp_path / "record.json"))
+    monkeypatch.setenv(VARIABLE, "quick")
     assert cli.run(["test", "--all"]) == status
     record = json.loads((tmp_path / "record.json").read_text())
     assert {name: record[name] for name in ("commit", "passed", "failed", "skipped")} == {
@@ -110,6 +111,7 @@ def test_a_run_of_all_tiers_is_recorded_with_its_commit_and_counts(
         "skipped": 3,
     }
     assert record["seconds"] == 61
+    assert record["compilation"] == "quick"
     assert "4 threads" in record["machine"]
     assert capsys.readouterr().out == f"written: {tmp_path / 'record.json'}\n"
 
