@@ -158,7 +158,11 @@ def _light(engine: Engine, lamp: Lamp, point: Array, shadows: bool) -> tuple[Arr
         axis = np.array(lamp.axis) / np.linalg.norm(lamp.axis)
         sent = sent * (-(way @ axis) > math.cos(lamp.cutoff))
     if shadows:
-        sent = sent * (_to_ball(point, way) > r) * (point[..., 2] > -1e-6)
+        # The floor has an edge: beyond it light reaches points below.
+        below = point[..., 2] < -1e-6
+        up = np.where(below, -point[..., 2] / np.where(below, way[..., 2], 1), 0)
+        on_floor = (np.abs((point + up[..., None] * way)[..., :2]) <= HALF).all(axis=-1)
+        sent = sent * (_to_ball(point, way) > r) * ~(below & on_floor)
     return sent, way, r
 
 
