@@ -37,8 +37,8 @@ import numpy as np
 from mpmath import mp, mpf
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.droplets import WATER, Droplets, Modified, Optics, optics
-from analytic.errors import InputError
+from airlight.analytic.droplets import WATER, Droplets, Modified, Optics, optics
+from airlight.analytic.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.errors import InputError
-from analytic.phase import PhaseFunction
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import PhaseFunction
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 
 _HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(_HERE.parent), str(_HERE / "_ext")]
+sys.path[:0] = [str(_HERE.parent / "src"), str(_HERE / "_ext")]
 
-from reports import __version__  # noqa: E402 - found on the path set above
+from airlight.reports import __version__  # noqa: E402 - found on the path set above
 
 project = "airlight"
 author = "the airlight authors"

@@ -49,7 +49,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
+from airlight.realtime.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -53,8 +53,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import Metres, PerRay
-from realtime.numerics.functions import exp2_bounded
+from airlight.realtime.numerics.array_types import Metres, PerRay
+from airlight.realtime.numerics.functions import exp2_bounded
 
 _LEAST, _MOST = 1e-30, 1e30  # depths beyond stand for one another: a depth of 0, the sky [m]
 _SCALE = 0.8493218002880191  # sqrt(log2(e) / 2): exp(-t^2/2) = 2^-(_SCALE t)^2

@@ -12,7 +12,7 @@ words, checks, their messages, `airlight list methods` and the tables of the doc
 Steps(steps=24)
 >>> Steps(steps=0)
 Traceback (most recent call last):
-realtime.errors.InputError: steps: got 0, expected a whole number of at least 1
+airlight.realtime.errors.InputError: steps: got 0, expected a whole number of at least 1
 """
 
 import difflib
@@ -22,7 +22,7 @@ from dataclasses import Field, dataclass, field, fields
 from numbers import Integral, Real
 from typing import Any
 
-from realtime.errors import InputError
+from airlight.realtime.errors import InputError
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 

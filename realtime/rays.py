@@ -64,7 +64,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.scene.lights import Cone, Light
+from airlight.realtime.scene.lights import Cone, Light
 
 _TINY = 2.0**-100
 

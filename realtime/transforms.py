@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
+from airlight.realtime.errors import InputError
 
 Array = NDArray[np.float64]
 

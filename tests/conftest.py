@@ -15,6 +15,10 @@ from tests.helpers.clock import Clock
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Child processes run functions of tests too, and find `tests` from here.
+_ROOT = Path(__file__).resolve().parents[1]
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
+
 
 def pytest_addoption(parser):
     words = "a file of regular expressions: a skip for any other reason fails the run"
@@ -39,7 +43,7 @@ def pytest_sessionfinish(session):
 @pytest.fixture(scope="session")
 def data_folder() -> Path:
     """The folder of certified values."""
-    from validation.certified.files import FOLDER
+    from airlight.validation.certified.files import FOLDER
 
     return FOLDER
 
@@ -47,7 +51,7 @@ def data_folder() -> Path:
 @pytest.fixture(scope="session")
 def variant() -> str:
     """The best Mitsuba variant that works on this machine, made current."""
-    from reports.machine.environment import LEAST_THREADS, activate
+    from airlight.reports.machine.environment import LEAST_THREADS, activate
 
     chosen = activate()
     # Workers have a core each: more threads would wait for one another. `tests/realtime/frame/test_threads.py` has all.
@@ -81,7 +85,7 @@ def own_cache(monkeypatch, tmp_path) -> Path:
 def clock(variant, monkeypatch) -> Clock:
     """The clock of all times in this process, which goes on only where a test says so."""
     clock = Clock()
-    monkeypatch.setattr("analytic.clock.time", clock)
+    monkeypatch.setattr("airlight.analytic.clock.time", clock)
     return clock
 
 

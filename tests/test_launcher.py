@@ -30,7 +30,7 @@ case "$*" in
     "-m venv "*) echo venv >>"$here/log"; mkdir -p "$3/bin" && ln -s "$(readlink -f "$0")" "$3/bin/python" &&
         ln -s "$here/uv" "$3/bin/uv" ;;
     "-m pip "*) echo pip >>"$here/log"; [ ! -e "$here/pip-fails" ] ;;
-    *"-m reports.machine.doctor") cat "$here/missing" 2>/dev/null || echo ;;
+    *"-m airlight.reports.machine.doctor") cat "$here/missing" 2>/dev/null || echo ;;
     -c*) true ;;
     *) printf 'ran'; for word; do printf ' <%s>' "$word"; done; echo ;;
 esac
@@ -51,7 +51,7 @@ def machine(tmp_path):
     project.mkdir()
     programs.mkdir()
     shutil.copy(ROOT / "airlight", project)
-    for name in (*LOCKS, "pyproject.toml", "airlight.py"):
+    for name in (*LOCKS, "pyproject.toml"):
         (project / name).write_text(f"{name}\n")
     _program(programs / "python3.11", _PYTHON)
     _program(programs / "uv", _UV)
@@ -83,13 +83,12 @@ def _log(machine: Path) -> list[str]:
 
 def test_the_first_start_installs_and_later_starts_do_not(machine):
     first = _start(machine, "report", "--scenes", "a b,c", "*")
-    script = machine / "a project" / "airlight.py"
-    assert (first.returncode, first.stdout) == (0, f"ran <{script}> <report> <--scenes> <a b,c> <*>\n")
+    assert (first.returncode, first.stdout) == (0, "ran <-P> <-m> <airlight> <report> <--scenes> <a b,c> <*>\n")
     assert _log(machine) == ["venv", "pip", "uv", "uv"]
     assert first.stderr.count("\n") == 1
     (machine / "link").symlink_to(machine / "a project" / "airlight")
     second = _start(machine, "--version", launcher=machine / "link")
-    assert (second.returncode, second.stdout, second.stderr) == (0, f"ran <{script}> <--version>\n", "")
+    assert (second.returncode, second.stdout, second.stderr) == (0, "ran <-P> <-m> <airlight> <--version>\n", "")
     assert _log(machine) == []
 
 

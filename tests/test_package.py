@@ -59,8 +59,9 @@ def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
 
 
 def test_importing_everything_sets_no_variant_and_fails_nowhere():
-    paths = [ROOT / "airlight.py", *(path for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py")))]
-    names = [".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in paths]
+    paths = [path for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py"))]
+    parts = [path.relative_to(ROOT).with_suffix("").parts for path in paths]
+    names = ["airlight", *(".".join(("airlight", *each)).removesuffix(".__init__") for each in parts)]
     code = f"import importlib\nfor name in {names!r}: importlib.import_module(name)\n"
     _python(code + "import mitsuba; assert mitsuba.variant() is None, mitsuba.variant()")
 
@@ -70,7 +71,7 @@ def test_help_imports_nothing_heavy():
     heavy = ("mitsuba", "drjit", "numpy", "scipy", "mpmath", "matplotlib", "colour", "OpenEXR", "jinja2")
     code = (
         "import sys, airlight\n"
-        "from reports.commands.start import main\n"
+        "from airlight.reports.commands.start import main\n"
         "sys.argv = ['airlight', '--help']\n"
         "try: main()\n"
         "except SystemExit as end: assert not end.code, end.code\n"
@@ -80,36 +81,84 @@ def test_help_imports_nothing_heavy():
     assert "report" in _python(code)
 
 
-def test_packages_of_the_same_names_beside_a_script_are_not_taken_for_ours(tmp_path):
-    for name in ("reports", "analytic"):  # a package, and a folder without a file of Python
+@pytest.fixture
+def hostile(tmp_path):
+    """A folder of a user's own, with names that airlight has inside."""
+    for name in ("reports", "reference"):  # a folder without a file of Python, and a package
         (tmp_path / name).mkdir()
-    (tmp_path / "reports" / "__init__.py").touch()
+    (tmp_path / "reference" / "__init__.py").touch()
     (tmp_path / "validation.py").write_text("raise SystemExit('a module of the user')\n")
-    (tmp_path / "script.py").write_text("import airlight\nprint(airlight.SCENES['open-fog'].name)\n")
-    world = os.environ | {"PYTHONPATH": str(ROOT)}
+    (tmp_path / "script.py").write_text("import reference, airlight\nprint(airlight.SCENES['open-fog'].name)\n")
+    return tmp_path
+
+
+def test_packages_of_the_same_names_beside_a_script_are_not_taken_for_ours(hostile):
     for command in (["script.py"], ["-m", "airlight", "list", "papers"]):
-        ran = subprocess.run([sys.executable, *command], cwd=tmp_path, env=world, capture_output=True, text=True)
+        ran = subprocess.run([sys.executable, *command], cwd=hostile, capture_output=True, text=True)
         assert ran.returncode == 0, ran.stderr
-    code = "import reports, airlight"
-    ran = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=world, capture_output=True, text=True)
-    assert "import airlight first, or rename that one" in ran.stderr.splitlines()[-1]
+
+
+def test_a_function_of_the_name_of_a_folder_stays_a_function():
+    code = "import airlight.reference.scene.read, airlight; print(callable(airlight.reference))"
+    assert _python(code) == "True\n"
+    code = "from airlight import reference; import airlight.reference.storage.exr; print(callable(reference))"
+    assert _python(code) == "True\n"
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """A wheel built from what git tracks, in a copy; and the files that git tracks."""
+    ran = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
+    if ran.returncode:
+        pytest.skip("this is no git checkout, so what belongs to the project is unknown")
+    folder = tmp_path_factory.mktemp("source")
+    tracked = [name for name in ran.stdout.split("\0") if name and os.path.lexists(ROOT / name)]
+    for name in tracked:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, folder / name, follow_symlinks=False)
+    build = "import sys, setuptools.build_meta as backend; print(backend.build_wheel(sys.argv[1]))"
+    command = [sys.executable, "-c", build, str(folder / "dist")]
+    ran = subprocess.run(command, cwd=folder, env=os.environ | {"PYTHONPATH": ""}, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    return next((folder / "dist").glob("*.whl")), tracked
 
 
 @pytest.mark.slow
 @pytest.mark.claim("wheel-holds-the-packages")
-def test_a_wheel_holds_every_file_of_the_packages_and_nothing_else(tmp_path):
-    """Built from what git tracks, in a copy: templates, schemas and data are not forgotten, tests are not taken."""
-    ran = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
-    if ran.returncode:
-        pytest.skip("this is no git checkout, so what belongs to the project is unknown")
-    tracked = [name for name in ran.stdout.split("\0") if name and (ROOT / name).is_file()]
-    for name in tracked:
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, tmp_path / name)
-    build = "import sys, setuptools.build_meta as backend; print(backend.build_wheel(sys.argv[1]))"
-    command = [sys.executable, "-c", build, str(tmp_path / "dist")]
-    ran = subprocess.run(command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": ""}, capture_output=True, text=True)
-    assert ran.returncode == 0, ran.stderr
-    with zipfile.ZipFile(next((tmp_path / "dist").glob("*.whl"))) as archive:
+def test_a_wheel_holds_every_file_of_the_packages_and_nothing_else(wheel):
+    """Templates, schemas and data are not forgotten, tests are not taken, and `airlight` is the only name."""
+    path, tracked = wheel
+    with zipfile.ZipFile(path) as archive:
         held = {name for name in archive.namelist() if not name.endswith("/") and ".dist-info/" not in name}
-    assert held == {name for name in tracked if name == "airlight.py" or name.split("/")[0] in PACKAGES}
+    own = {name.removeprefix("src/") for name in tracked if name.startswith("src/") and (ROOT / name).is_file()}
+    assert held == own | {f"airlight/{name}" for name in tracked if name.split("/")[0] in PACKAGES}
+
+
+@pytest.mark.slow
+@pytest.mark.claim("wheel-holds-the-packages")
+def test_an_installed_wheel_does_its_work_beside_folders_of_its_names(wheel, hostile):
+    """In a new environment that shares the packages of this one, without the checkout."""
+    path, _ = wheel
+    site, home = hostile / "site", hostile / "home"
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(site)
+    assert {each.name for each in site.iterdir() if not each.name.endswith(".dist-info")} == {"airlight"}
+    (hostile / "mine.py").write_text("def fog(view):\n    return 0.01 + 0 * view.direction.x\n")
+    # -S and the folders of packages: what an editable installation has put into this environment is not there.
+    packages = [place for place in sys.path if place.endswith(("site-packages", "dist-packages"))]
+    world = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "AIRLIGHT"))}
+    world |= {"PYTHONPATH": os.pathsep.join([str(site), *packages]), "AIRLIGHT_CACHE_DIR": str(home)}
+    small = ["--size", "16x12"]
+    for words in (
+        ["list"],
+        ["render", "open-fog", *small],
+        ["render", "open-fog", *small, "--method", "mine.py:fog"],
+        ["report", "open-fog", "--quick", *small, "--method", "unshadowed", "-o", "out"],
+    ):
+        command = [sys.executable, "-S", "-m", "airlight", *words]
+        ran = subprocess.run(command, cwd=hostile, env=world, capture_output=True, text=True)
+        assert ran.returncode == 0, ran.stderr
+    code = "import airlight; print(airlight.__file__); airlight.render('open-fog', 'unshadowed', size=(4, 3))"
+    ran = subprocess.run([sys.executable, "-S", "-c", code], cwd=hostile, env=world, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.startswith(str(site))

@@ -22,14 +22,14 @@ def test_errors_are_those_of_the_baseline(name, variant):
 
 @pytest.mark.claim("baselines")
 def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
-    import validation.study.configuration
-    from realtime.kernels.registry import Kernel
-    from validation.study.configuration import Configuration
+    import airlight.validation.study.configuration
+    from airlight.realtime.kernels.registry import Kernel
+    from airlight.validation.study.configuration import Configuration
 
     plain = Configuration("unshadowed", "exact")
-    find = validation.study.configuration.find_kernel
+    find = airlight.validation.study.configuration.find_kernel
     monkeypatch.setattr(
-        validation.study.configuration,
+        airlight.validation.study.configuration,
         "find_kernel",
         lambda name: Kernel(name, lambda *arguments: 1.001 * find(name)(*arguments), exact=True),
     )

@@ -19,8 +19,8 @@ from typing import Any, Generic, TypeVar
 import drjit as dr
 import numpy as np
 
-from analytic.clock import Spent, stopwatch
-from validation.timing import Timing
+from airlight.analytic.clock import Spent, stopwatch
+from airlight.validation.timing import Timing
 
 #: In which pieces of work take turns: five ends of rounds show a change of the machine that lasts a fifth of a run, and
 #: the median of five is not moved by two that it spoiled.

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError, nearest
+from airlight.analytic.errors import InputError, nearest
 
 Reader = Callable[[str, Any], Any]
 

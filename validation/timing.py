@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from validation.columns import column
+from airlight.validation.columns import column
 
 #: Repetitions of an anchor at each end of a round. A median of n repetitions that scatter by a standard deviation s has
 #: the standard error 1.253 s/sqrt(n), and quartiles lie 1.349 s apart. Five rounds with two ends have ten medians, of

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parts of pages that list what the program has: modules, names, commands, methods, kernels."""
 
+import ast
 import inspect
 import re
 from collections.abc import Callable, Sequence
@@ -9,10 +10,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from reports.commands.list import list_
-from reports.data.records import meanings, record_types
-from reports.tables.drawing import markdown
-from reports.tables.table import Name, Row, Table
+from airlight.reports.commands.list import list as list_
+from airlight.reports.data.records import meanings, record_types
+from airlight.reports.tables.drawing import markdown
+from airlight.reports.tables.table import Name, Row, Table
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Words in the help of parameters, and the pages that they link to.
@@ -27,16 +28,16 @@ def table(headers: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1)
 
 #: Results of the functions of `import airlight`.
 _RESULTS = (
-    "reports.api.results.Rendering",
-    "reports.api.results.Reference",
-    "reports.api.comparisons.ImageComparison",
-    "reports.api.comparisons.SceneComparison",
-    "reports.api.comparisons.Fitted",
-    "reports.api.report.Report",
-    "reports.studies.registry.Study",
-    "reports.studies.methods.MethodsStudy",
-    "reports.studies.kernels.Integrals",
-    "reports.studies.clouds.SlabStudy",
+    "airlight.reports.api.results.Rendering",
+    "airlight.reports.api.results.Reference",
+    "airlight.reports.api.comparisons.ImageComparison",
+    "airlight.reports.api.comparisons.SceneComparison",
+    "airlight.reports.api.comparisons.Fitted",
+    "airlight.reports.api.report.Report",
+    "airlight.reports.studies.registry.Study",
+    "airlight.reports.studies.methods.MethodsStudy",
+    "airlight.reports.studies.kernels.Integrals",
+    "airlight.reports.studies.clouds.SlabStudy",
 )
 
 
@@ -44,7 +45,16 @@ def _public() -> dict[str, Any]:
     """Return the public names of `airlight` with their values."""
     import airlight
 
-    return {name: getattr(airlight, name) for name in sorted(airlight._API, key=str.lower)}
+    return {name: getattr(airlight, name) for name in sorted(_homes(), key=str.lower)}
+
+
+def _homes() -> dict[str, str]:
+    """Return the module of each public name."""
+    import airlight
+
+    stub = ast.parse(Path(airlight.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    lines = [line for line in stub.body if isinstance(line, ast.ImportFrom)]
+    return {name.name: f"airlight.{line.module}" for line in lines for name in line.names}
 
 
 def _documented(value: Any) -> bool:
@@ -53,12 +63,11 @@ def _documented(value: Any) -> bool:
 
 def names() -> str:
     """Return the public names of `airlight`, each with a sentence and a link to its signature."""
-    import airlight
-
+    homes = _homes()
     rows = [
         (f"{{py:obj}}`{name} <{value.__module__}.{value.__name__}>`", _sentence(value))
         if _documented(value)
-        else (f"`{name}`", f"see `{airlight._API[name][0]}`")
+        else (f"`{name}`", f"see `{homes[name]}`")
         for name, value in _public().items()
     ]
     return table(("name", "what it is"), rows, 2)
@@ -104,21 +113,21 @@ def _named(shown: Table, address: Callable[[str], str] = lambda name: "") -> Tab
 
 def parameters(method: str) -> str:
     """Return a table of a method's parameters: values, the default first, and what they do."""
-    from realtime.methods.registry import METHODS
+    from airlight.realtime.methods.registry import METHODS
 
     return _fields(METHODS[method])
 
 
 def light_samples() -> str:
     """Return a table of the parameters that all methods have for area lights."""
-    from realtime.area_lights.points import LightSamples
+    from airlight.realtime.area_lights.points import LightSamples
 
     return _fields(LightSamples)
 
 
 def history() -> str:
     """Return a table of the parameters of a history."""
-    from realtime.methods.history import History
+    from airlight.realtime.methods.history import History
 
     return _fields(History)
 
@@ -130,7 +139,7 @@ def _fields(record: Any) -> str:
 
 def _parameter(item: Any) -> tuple[str, str]:
     """Return the values of a parameter, its default first, and what it does."""
-    from realtime.parameters import limits_of, wanted_values
+    from airlight.realtime.parameters import limits_of, wanted_values
 
     limits = limits_of(item)
     if isinstance(item.default, str) and limits.choices:
@@ -150,14 +159,14 @@ def kernels() -> str:
 
 def studies() -> str:
     """Return the studies with what each measures."""
-    from reports.studies.registry import STUDIES, summary
+    from airlight.reports.studies.registry import STUDIES, summary
 
     return table(("study", "what it measures"), [(f"`{name}`", _cell(summary(name))) for name in STUDIES], 2)
 
 
 def sweep_columns() -> str:
     """Return the columns of a sweep's rows."""
-    from validation.study.row import COLUMNS
+    from airlight.validation.study.row import COLUMNS
 
     rows = [(f"`{each.key}`", each.unit, _cell(each.meaning)) for each in COLUMNS]
     return table(("column", "unit", "meaning"), rows, 3)
@@ -166,7 +175,7 @@ def sweep_columns() -> str:
 @cache
 def commands() -> str:
     """Return every command and every study with its arguments, options and words."""
-    from reports.commands.main import command_names, find_command
+    from airlight.reports.commands.main import command_names, find_command
 
     shown = []
     for words in command_names():

@@ -11,16 +11,16 @@ from typing import Any
 from listed import table
 from shown import scene_picture
 
-from reports.data import records
-from reports.tables.agreement import left_out_table
-from reports.tables.costs import cost_table
-from reports.tables.drawing import markdown
-from reports.tables.methods import COLUMNS, fastest_table, method_row
-from reports.tables.table import Column, Name, Row, Table, number
-from validation.columns import record_of
-from validation.kernels.records import KernelCost
-from validation.statistics.records import Fraction, MultipleScattering
-from validation.study.row import Row as CellRow
+from airlight.reports.data import records
+from airlight.reports.tables.agreement import left_out_table
+from airlight.reports.tables.costs import cost_table
+from airlight.reports.tables.drawing import markdown
+from airlight.reports.tables.methods import COLUMNS, fastest_table, method_row
+from airlight.reports.tables.table import Column, Name, Row, Table, number
+from airlight.validation.columns import record_of
+from airlight.validation.kernels.records import KernelCost
+from airlight.validation.statistics.records import Fraction, MultipleScattering
+from airlight.validation.study.row import Row as CellRow
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 _METHOD = ("frame", "light_moved", "relative_rmse", "relative_bias", "p99", "max")
@@ -118,7 +118,7 @@ def _inside(label: str) -> str:
 
 def kernel_costs(phase: str) -> str:
     """Return the costs and errors of kernels of the default sizes for one phase function."""
-    from realtime.kernels.registry import KERNELS
+    from airlight.realtime.kernels.registry import KERNELS
 
     kernels = data()["kernels"]
     if kernels is None:
@@ -145,7 +145,7 @@ def _percent(found: Fraction) -> str:
 
 def scenes() -> str:
     """Return the gallery: every built-in scene with its picture, what it is for and what it holds."""
-    from validation.scenes.registry import SCENES
+    from airlight.validation.scenes.registry import SCENES
 
     kept = {scene.name: scene for scene in kept_scenes()}
     return "\n".join(_scene(record, kept.get(name)) for name, record in SCENES.items())

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from reports.tables.table import number
+from airlight.reports.tables.table import number
 
 FOLDER = Path(__file__).resolve().parents[1] / "gallery"
 _METHODS = ("sketch", "method", "error")  # in the order of a page

@@ -101,14 +101,14 @@ def _apart(image: Array, right: Array) -> float:
 
 def _images(scene: str, seed: int) -> list[dict[str, Any]]:
     """Return images of a scene, right ones and one with a fault for each of these: rows without a diagnosis."""
-    from reference.scene.read import read_reference
-    from reference.storage.exr import Image
-    from validation.engine.fault import traits
-    from validation.engine.faults import FAULTS
-    from validation.engine.prediction import Guess, Predictor, SceneLight
-    from validation.engine.search import _own_starts
-    from validation.engine.seen import JudgedLayer, seen_image
-    from validation.scenes.loading import load_scene
+    from airlight.reference.scene.read import read_reference
+    from airlight.reference.storage.exr import Image
+    from airlight.validation.engine.fault import traits
+    from airlight.validation.engine.faults import FAULTS
+    from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
+    from airlight.validation.engine.search import _own_starts
+    from airlight.validation.engine.seen import JudgedLayer, seen_image
+    from airlight.validation.scenes.loading import load_scene
 
     rng = np.random.default_rng(seed)
     loaded = load_scene(scene, _SIZE)
@@ -166,8 +166,8 @@ def _images(scene: str, seed: int) -> list[dict[str, Any]]:
 
 def _diagnosed(row: dict[str, Any]) -> dict[str, Any]:
     """Return a row with what the diagnosis found, whatever the limits are."""
-    from reference.storage.exr import Image
-    from validation.engine.diagnose import diagnose_image
+    from airlight.reference.storage.exr import Image
+    from airlight.validation.engine.diagnose import diagnose_image
 
     image = Image({"total": row["image"]}, attributes={"airlight:pixel": "centre", "airlight:scene": row["scene"]})
     said = diagnose_image(image, row["loaded"], layer="total", pixel="centre", light=row["light"])
@@ -228,14 +228,14 @@ def chosen_limits(rows: list[dict[str, Any]]) -> tuple[float, float]:
 
 def main() -> None:
     """Make the images, diagnose them, and write the limits and the record."""
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", choices=("calibrated", "measured"), help="these images; others keep their rows")
     parser.add_argument("--limits", action="store_true", help="choose the limits again, from the rows that there are")
     chosen = parser.parse_args()
     activate()
-    from reference.storage.files import write_text
+    from airlight.reference.storage.files import write_text
 
     record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
     rows = record.setdefault("rows", {"calibrated": [], "measured": []})

@@ -40,10 +40,10 @@ def answers(
     root
         The checkout.
     """
-    from reference.scene.read import read_reference
-    from validation.engine.diagnose import diagnose_file
-    from validation.engine.prediction import SceneLight
-    from validation.scenes.loading import load_scene
+    from airlight.reference.scene.read import read_reference
+    from airlight.validation.engine.diagnose import diagnose_file
+    from airlight.validation.engine.prediction import SceneLight
+    from airlight.validation.scenes.loading import load_scene
 
     scene = str(root / SCENES[name]) if SCENES[name].endswith(".xml") else SCENES[name]
     if python is None:
@@ -99,9 +99,9 @@ def render_faults(
     root
         The checkout.
     """
-    from reports.interchange.gltf import write_gltf
-    from reports.interchange.scene import describe_scene
-    from validation.scenes.loading import load_scene
+    from airlight.reports.interchange.gltf import write_gltf
+    from airlight.reports.interchange.scene import describe_scene
+    from airlight.validation.scenes.loading import load_scene
 
     folder.mkdir(parents=True, exist_ok=True)
     loaded = load_scene(scene, size)
@@ -123,8 +123,8 @@ def _listed(python: str, root: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Render what is missing, diagnose all images, and write the record."""
-    from reference.storage.files import write_text
-    from reports.machine.environment import activate
+    from airlight.reference.storage.files import write_text
+    from airlight.reports.machine.environment import activate
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--images", type=Path, required=True, help="folder of images, one folder for each scene")

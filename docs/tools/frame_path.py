@@ -7,12 +7,12 @@ Those in which a function runs from the loaded Mitsuba scene to the image, in th
 import sys
 from pathlib import Path
 
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import find_method
-from realtime.scene.read_scene import read_scene
-from reports.machine.environment import activate
-from validation.scenes.loading import load_scene
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import find_method
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reports.machine.environment import activate
+from airlight.validation.scenes.loading import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -19,22 +19,22 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from analytic.errors import InputError, nearest
-from realtime.frame.samples import render_samples
-from realtime.methods.registry import METHODS
-from realtime.scene.read_scene import read_scene
-from reference.storage.files import temporary_folder, write_bytes, write_text
-from reports.data.records import read_report
-from reports.machine.environment import MissingError, activate, versions
-from reports.plotting.pictures import error_map, error_scale, preview, tone_curve
-from reports.tables.table import number
-from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import error_metrics
-from validation.scenes.changes import parse_changes
-from validation.scenes.loading import LoadedScene, load_scene
-from validation.scenes.registry import SCENES
-from validation.study.configuration import configuration, parse_settings, prepared
-from validation.study.turns import time_frame
+from airlight.analytic.errors import InputError, nearest
+from airlight.realtime.frame.samples import render_samples
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.storage.files import temporary_folder, write_bytes, write_text
+from airlight.reports.data.records import read_report
+from airlight.reports.machine.environment import MissingError, activate, versions
+from airlight.reports.plotting.pictures import error_map, error_scale, preview, tone_curve
+from airlight.reports.tables.table import number
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.scenes.changes import parse_changes
+from airlight.validation.scenes.loading import LoadedScene, load_scene
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.study.configuration import configuration, parse_settings, prepared
+from airlight.validation.study.turns import time_frame
 
 DOCS = Path(__file__).resolve().parents[1]
 FOLDER = DOCS / "gallery"

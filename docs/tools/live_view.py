@@ -19,7 +19,7 @@ def take_picture(path: Path) -> None:
     """Write a picture of the page: the scene, a method beside its error, times and widgets."""
     from playwright.sync_api import TimeoutError, sync_playwright
 
-    command = [sys.executable, str(_ROOT / "airlight.py"), *_VIEW]
+    command = [sys.executable, "-m", "airlight", *_VIEW]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None

@@ -12,10 +12,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError
-from reference.storage.files import write_text
-from reports.data.records import read_json, read_report
-from reports.machine.environment import activate
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.files import write_text
+from airlight.reports.data.records import read_json, read_report
+from airlight.reports.machine.environment import activate
 
 DOCS = Path(__file__).resolve().parents[1]
 DATA, README = DOCS / "data" / "report.json", DOCS.parent / "README.md"
@@ -114,7 +114,7 @@ def _kept_method(entry: dict[str, Any]) -> dict[str, Any]:
 
 def counts(name: str) -> dict[str, int]:
     """Return how many shapes, triangles and lights a built-in scene has."""
-    from validation.scenes.loading import load_scene
+    from airlight.validation.scenes.loading import load_scene
 
     scene = load_scene(name, (8, 6)).scene
     shapes = scene.shapes()

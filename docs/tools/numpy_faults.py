@@ -312,7 +312,7 @@ CASES = tuple(
 
 def main() -> None:
     """Render, diagnose and write the record."""
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="*", type=int, help="numbers of faults; others keep their rows")
@@ -321,12 +321,12 @@ def main() -> None:
     activate()
     import tempfile
 
-    from reference.scene.read import read_reference
-    from reference.storage.exr import Image
-    from reference.storage.files import write_text
-    from validation.engine.diagnose import diagnose_image
-    from validation.engine.prediction import SceneLight
-    from validation.scenes.loading import load_scene
+    from airlight.reference.scene.read import read_reference
+    from airlight.reference.storage.exr import Image
+    from airlight.reference.storage.files import write_text
+    from airlight.validation.engine.diagnose import diagnose_image
+    from airlight.validation.engine.prediction import SceneLight
+    from airlight.validation.scenes.loading import load_scene
 
     scenes = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -27,8 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.shape import AreaLight
-from realtime.parameters import Parameters, parameter
+from airlight.realtime.area_lights.shape import AreaLight
+from airlight.realtime.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
-from realtime.transforms import host_matrix, turned_outwards
+from airlight.realtime.errors import InputError
+from airlight.realtime.transforms import host_matrix, turned_outwards
 
 Array = NDArray[np.float64]
 

@@ -74,8 +74,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.canonical.transport_grid import Transport
-from realtime.clouds.light_maps import FilteredSurface, LightMap, filtered_surface
+from airlight.realtime.clouds.canonical.transport_grid import Transport
+from airlight.realtime.clouds.light_maps import FilteredSurface, LightMap, filtered_surface
 
 LEAST_COSINE = 0.02  #: of the sun over a tangent plane
 _LEAST_LENGTH = 1e-4  #: of a mean of unit normals that has a direction

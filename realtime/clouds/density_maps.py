@@ -37,14 +37,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.light_maps import LitSurfaces
-from realtime.clouds.march import CloudSurfaces, march, middle_density, voxel
-from realtime.numerics.array_types import Metres, bytes_of
-from realtime.numerics.functions import cell_of
-from realtime.scene.lights import Light
-from realtime.scene.media.bounded import Clouds
-from realtime.shadow_maps.projection import Projection, light_projection
-from realtime.shadow_maps.shadow_map import check_size, texel_rays
+from airlight.realtime.clouds.light_maps import LitSurfaces
+from airlight.realtime.clouds.march import CloudSurfaces, march, middle_density, voxel
+from airlight.realtime.numerics.array_types import Metres, bytes_of
+from airlight.realtime.numerics.functions import cell_of
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.bounded import Clouds
+from airlight.realtime.shadow_maps.projection import Projection, light_projection
+from airlight.realtime.shadow_maps.shadow_map import check_size, texel_rays
 
 SIZE, LAYERS = 256, 64  #: texels on a side, layers of each
 

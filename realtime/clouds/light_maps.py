@@ -46,10 +46,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import Metres, PerRay, bytes_of, four_numbers, packed
-from realtime.scene.lights import Light
-from realtime.shadow_maps.projection import Projection, light_projection
-from realtime.shadow_maps.shadow_map import check_size, texel_rays
+from airlight.realtime.numerics.array_types import Metres, PerRay, bytes_of, four_numbers, packed
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.projection import Projection, light_projection
+from airlight.realtime.shadow_maps.shadow_map import check_size, texel_rays
 
 
 @dataclass(frozen=True)

@@ -33,12 +33,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.array_types import Metres, PerRay, aligned_array, four_numbers
-from realtime.scene.closed_mesh import shape_number
-from realtime.scene.lights import Light
-from realtime.scene.media.bounded import Clouds
-from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
-from realtime.scene.read_scene import Scene
+from airlight.realtime.numerics.array_types import Metres, PerRay, aligned_array, four_numbers
+from airlight.realtime.scene.closed_mesh import shape_number
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.bounded import Clouds
+from airlight.realtime.scene.mesh_adjacency import mesh_triangles, scene_of
+from airlight.realtime.scene.read_scene import Scene
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.clouds.march import (
+from airlight.realtime.clouds.march import (
     OPAQUE,
     SPREAD,
     CloudSurfaces,
@@ -69,10 +69,10 @@ from realtime.clouds.march import (
     next_crossing,
     voxel,
 )
-from realtime.numerics.array_types import PerRay, chosen_value
-from realtime.numerics.functions import exp_bounded, exp_expm1_bounded
-from realtime.scene.lights import Light
-from realtime.scene.media.bounded import Clouds
+from airlight.realtime.numerics.array_types import PerRay, chosen_value
+from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.bounded import Clouds
 
 _LAST = 1.0001  # times the fraction of a step: rounding leaves none behind the last
 

@@ -41,18 +41,18 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical.coordinates import FIRST_ORDERS, ORDER_LAYERS, slab_phase
-from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
-from realtime.clouds.single_scattering import CloudRays, opacity_of
-from realtime.clouds.slab_orders.depth_panels import Transport, depth_panels
-from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
-from realtime.clouds.slab_orders.phases import SlabPhase
-from realtime.numerics.array_types import types_of
-from realtime.numerics.functions import between_entries
-from realtime.scene.lights import Light
-from realtime.scene.media.bounded import Clouds
-from realtime.scene.mesh_adjacency import mesh_triangles
-from realtime.scene.read_scene import Scene
+from airlight.realtime.clouds.canonical.coordinates import FIRST_ORDERS, ORDER_LAYERS, slab_phase
+from airlight.realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
+from airlight.realtime.clouds.single_scattering import CloudRays, opacity_of
+from airlight.realtime.clouds.slab_orders.depth_panels import Transport, depth_panels
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.realtime.numerics.array_types import types_of
+from airlight.realtime.numerics.functions import between_entries
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.bounded import Clouds
+from airlight.realtime.scene.mesh_adjacency import mesh_triangles
+from airlight.realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
 

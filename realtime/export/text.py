@@ -15,13 +15,13 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.export.languages import LANGUAGES
-from realtime.kernels.exact import DEEPEST, MOST_PANELS
-from realtime.numerics.functions import EXP2, LOG2_E, SINH, unit_nodes
-from realtime.scene.media.medium import OPTICAL_REACH
-from realtime.scene.phase import Hazy, HenyeyGreenstein, HgDraine, Isotropic, Murky, Phase, Rayleigh
-from realtime.scene.rule_reach import PANEL_DEPTH, PANEL_NODES
+from airlight.realtime.errors import InputError
+from airlight.realtime.export.languages import LANGUAGES
+from airlight.realtime.kernels.exact import DEEPEST, MOST_PANELS
+from airlight.realtime.numerics.functions import EXP2, LOG2_E, SINH, unit_nodes
+from airlight.realtime.scene.media.medium import OPTICAL_REACH
+from airlight.realtime.scene.phase import Hazy, HenyeyGreenstein, HgDraine, Isotropic, Murky, Phase, Rayleigh
+from airlight.realtime.scene.rule_reach import PANEL_DEPTH, PANEL_NODES
 
 _LN2_HIGH = 355 / 512  # nine bits of ln 2
 _ROOT_HALF = 0x3F3504F3  # bits of the float32 sqrt(1/2)

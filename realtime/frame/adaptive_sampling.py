@@ -37,13 +37,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.image_filters import channels
-from realtime.methods.interface.method import Layers, Method, View, camera_view
-from realtime.numerics.array_types import Metres, PerRay, PerTile, aligned_array
-from realtime.numerics.recorded import Frozen, refusals
-from realtime.scene.camera import SIDE, TILE, Camera, tiled_pixels
-from realtime.scene.read_scene import Scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.image_filters import channels
+from airlight.realtime.methods.interface.method import Layers, Method, View, camera_view
+from airlight.realtime.numerics.array_types import Metres, PerRay, PerTile, aligned_array
+from airlight.realtime.numerics.recorded import Frozen, refusals
+from airlight.realtime.scene.camera import SIDE, TILE, Camera, tiled_pixels
+from airlight.realtime.scene.read_scene import Scene
 
 _DEPTHS = 1.1  # largest to least distance in a tile
 

@@ -28,9 +28,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import Metres, PerRay
-from realtime.numerics.recorded import Frozen
-from realtime.scene.camera import Camera, ray_directions, row_and_column
+from airlight.realtime.numerics.array_types import Metres, PerRay
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.scene.camera import Camera, ray_directions, row_and_column
 
 _ALIKE = 0.05  # relative difference of depths up to which a pixel shows the same surface
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from realtime.frame.renderer import (
+from airlight.realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
     give_memory_back,
@@ -26,7 +26,7 @@ from realtime.frame.renderer import (
     run_method,
     run_shade,
 )
-from realtime.scene.read_scene import Scene
+from airlight.realtime.scene.read_scene import Scene
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
-from realtime.scene.camera import HostCamera, read_camera
-from realtime.scene.read_scene import Scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.scene.camera import HostCamera, read_camera
+from airlight.realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
 

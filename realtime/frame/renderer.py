@@ -29,23 +29,23 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.area_lights.points import LightSamples
-from realtime.errors import InputError
-from realtime.frame.adaptive_sampling import between_corners
-from realtime.frame.history import HistoryPass
-from realtime.frame.light_on_ray import check_radiance
-from realtime.frame.sphere_lights import sampled_sphere, sphere_scales
-from realtime.frame.surface import Cast, surface_stages
-from realtime.kernels.registry import Kernel
-from realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
-from realtime.numerics.array_types import PerRay, aligned_array
-from realtime.numerics.noise import Noise, blue_mask
-from realtime.numerics.recorded import Frozen, refusals
-from realtime.parameters import values
-from realtime.scene.camera import TILE, tiled_pixels
-from realtime.scene.light_samples import light_samples
-from realtime.scene.lights import Light
-from realtime.scene.read_scene import Scene
+from airlight.realtime.area_lights.points import LightSamples
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.adaptive_sampling import between_corners
+from airlight.realtime.frame.history import HistoryPass
+from airlight.realtime.frame.light_on_ray import check_radiance
+from airlight.realtime.frame.sphere_lights import sampled_sphere, sphere_scales
+from airlight.realtime.frame.surface import Cast, surface_stages
+from airlight.realtime.kernels.registry import Kernel
+from airlight.realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
+from airlight.realtime.numerics.array_types import PerRay, aligned_array
+from airlight.realtime.numerics.noise import Noise, blue_mask
+from airlight.realtime.numerics.recorded import Frozen, refusals
+from airlight.realtime.parameters import values
+from airlight.realtime.scene.camera import TILE, tiled_pixels
+from airlight.realtime.scene.light_samples import light_samples
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.read_scene import Scene
 
 _ROOM = 2**30  # of states of groups of lights, such as shadow maps, and as much of surfaces by group [bytes]
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be

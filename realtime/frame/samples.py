@@ -14,10 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from realtime.area_lights.points import bit_reversed
-from realtime.errors import InputError
-from realtime.frame.renderer import Frame, FrameRenderer, render_frame
-from realtime.scene.camera import shifted_camera
+from airlight.realtime.area_lights.points import bit_reversed
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import Frame, FrameRenderer, render_frame
+from airlight.realtime.scene.camera import shifted_camera
 
 
 def pixel_offsets(samples: int) -> Iterator[tuple[float, float]]:

@@ -24,15 +24,15 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.area_lights.points import LightSamples, place_points
-from realtime.area_lights.shape import AreaLight
-from realtime.methods.interface.method import Method, View, camera_view
-from realtime.numerics.array_types import aligned_array, types_of
-from realtime.numerics.functions import summed
-from realtime.numerics.recorded import Frozen
-from realtime.scene.lights import Facing
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.read_scene import Scene
+from airlight.realtime.area_lights.points import LightSamples, place_points
+from airlight.realtime.area_lights.shape import AreaLight
+from airlight.realtime.methods.interface.method import Method, View, camera_view
+from airlight.realtime.numerics.array_types import aligned_array, types_of
+from airlight.realtime.numerics.functions import summed
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.scene.lights import Facing
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.read_scene import Scene
 
 _AZIMUTHS, _ANGLES = 4, 8  # places for a ray
 

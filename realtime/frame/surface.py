@@ -21,14 +21,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import Metres, PerRay
-from realtime.numerics.recorded import Frozen
-from realtime.rays import profile
-from realtime.scene.camera import ray_directions
-from realtime.scene.lights import Light, sources_of
-from realtime.scene.media.medium import Medium, Rays
-from realtime.scene.read_scene import Scene
-from realtime.scene.triangle_table import Facets, facet_at, facet_number
+from airlight.realtime.numerics.array_types import Metres, PerRay
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.rays import profile
+from airlight.realtime.scene.camera import ray_directions
+from airlight.realtime.scene.lights import Light, sources_of
+from airlight.realtime.scene.media.medium import Medium, Rays
+from airlight.realtime.scene.read_scene import Scene
+from airlight.realtime.scene.triangle_table import Facets, facet_at, facet_number
 
 
 @dataclass(frozen=True)

@@ -35,13 +35,13 @@ fraction all terms that make Im w agree in sign, so Im S keeps its relative accu
 
 import drjit as dr
 
-from realtime.errors import InputError
-from realtime.kernels.exact import path_over_height
-from realtime.numerics.array_types import is_single, smallest
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import PHASES
+from airlight.realtime.errors import InputError
+from airlight.realtime.kernels.exact import path_over_height
+from airlight.realtime.numerics.array_types import is_single, smallest
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import PHASES
 
 _EULER = 0.57721566490153286
 

@@ -75,13 +75,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import is_single, smallest
-from realtime.numerics.functions import LOG2_E, exp2_bounded, exp_bounded, sinh_bounded, unit_nodes
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous, optical_reach
-from realtime.scene.phase import Phase
-from realtime.scene.rule_reach import FEW_DEPTH, FEW_NODES, PANEL_DEPTH, PANEL_NODES
+from airlight.realtime.numerics.array_types import is_single, smallest
+from airlight.realtime.numerics.functions import LOG2_E, exp2_bounded, exp_bounded, sinh_bounded, unit_nodes
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous, optical_reach
+from airlight.realtime.scene.phase import Phase
+from airlight.realtime.scene.rule_reach import FEW_DEPTH, FEW_NODES, PANEL_DEPTH, PANEL_NODES
 
 
 def is_short(geometry: RayGeometry, x0, x1, extinctions, phase: Phase):

@@ -21,11 +21,11 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from realtime.kernels.closed_form import closed_form
-from realtime.kernels.exact import exact
-from realtime.kernels.stepping import equiangular, quadrature, quadrature_theta, uniform
-from realtime.kernels.table import table, upload_table
-from realtime.kernels.taylor import taylor, taylor_bounded
+from airlight.realtime.kernels.closed_form import closed_form
+from airlight.realtime.kernels.exact import exact
+from airlight.realtime.kernels.stepping import equiangular, quadrature, quadrature_theta, uniform
+from airlight.realtime.kernels.table import table, upload_table
+from airlight.realtime.kernels.taylor import taylor, taylor_bounded
 
 
 @dataclass(frozen=True)

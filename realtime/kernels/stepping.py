@@ -15,13 +15,13 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.errors import InputError
-from realtime.kernels.exact import falloff_by_path, range_of_v, transmittance_before
-from realtime.numerics.array_types import smallest
-from realtime.numerics.functions import exp_bounded, summed, unit_nodes
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
+from airlight.realtime.errors import InputError
+from airlight.realtime.kernels.exact import falloff_by_path, range_of_v, transmittance_before
+from airlight.realtime.numerics.array_types import smallest
+from airlight.realtime.numerics.functions import exp_bounded, summed, unit_nodes
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
 
 
 def uniform(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, steps: int = 100):

@@ -25,12 +25,12 @@ from functools import lru_cache
 import drjit as dr
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.numerics.array_types import four_numbers
-from realtime.numerics.functions import cell_of
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import four_numbers
+from airlight.realtime.numerics.functions import cell_of
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
 
 _LARGEST_U = 10.0  # of Sun's table
 _LARGEST_SIZE = 2048  # 128 MiB in float32 on the device; the quadratures below are good to this size

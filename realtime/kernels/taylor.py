@@ -43,13 +43,13 @@ Two choices let it be compared with other kernels:
 import drjit as dr
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.numerics.array_types import largest
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.media.published_form import ConstantLeg, tangent_series
-from realtime.scene.phase import PHASES, Phase, series_product
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import largest
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.media.published_form import ConstantLeg, tangent_series
+from airlight.realtime.scene.phase import PHASES, Phase, series_product
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
 HIGHEST_DEGREE = 4

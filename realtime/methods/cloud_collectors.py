@@ -35,12 +35,18 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, fraction_of_peak, slab_phase
-from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
-from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
-from realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
-from realtime.clouds.density_maps import LightDepths, dense_surface, depths_memory, lit_dense_surface, sun_depths
-from realtime.clouds.light_maps import (
+from airlight.realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, fraction_of_peak, slab_phase
+from airlight.realtime.clouds.canonical.fit import fit_on_device, fitted_functions
+from airlight.realtime.clouds.canonical.transport_grid import canonical_transport, on_device
+from airlight.realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
+from airlight.realtime.clouds.density_maps import (
+    LightDepths,
+    dense_surface,
+    depths_memory,
+    lit_dense_surface,
+    sun_depths,
+)
+from airlight.realtime.clouds.light_maps import (
     LightMap,
     filtered_map,
     length_along_light,
@@ -48,8 +54,8 @@ from realtime.clouds.light_maps import (
     maps_memory,
     shade,
 )
-from realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
-from realtime.clouds.single_scattering import (
+from airlight.realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
+from airlight.realtime.clouds.single_scattering import (
     Beam,
     CloudRays,
     cloud_rays,
@@ -59,16 +65,16 @@ from realtime.clouds.single_scattering import (
     opacity_of,
     sky_behind,
 )
-from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
-from realtime.memory import check_memory
-from realtime.methods.interface.method import Layers, Method, View, tolerance
-from realtime.numerics.array_types import types_of
-from realtime.numerics.recorded import Frozen
-from realtime.parameters import parameter
-from realtime.scene.media.bounded import Clouds
-from realtime.scene.mesh_adjacency import scene_of
-from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.shadow_map import map_size
+from airlight.realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
+from airlight.realtime.memory import check_memory
+from airlight.realtime.methods.interface.method import Layers, Method, View, tolerance
+from airlight.realtime.numerics.array_types import types_of
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.media.bounded import Clouds
+from airlight.realtime.scene.mesh_adjacency import scene_of
+from airlight.realtime.scene.read_scene import Scene
+from airlight.realtime.shadow_maps.shadow_map import map_size
 
 _HALF = 0.5  #: of the density, as printed
 

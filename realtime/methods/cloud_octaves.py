@@ -21,17 +21,24 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, order_layer
-from realtime.clouds.density_maps import LightDepths, sun_depths
-from realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
-from realtime.clouds.single_scattering import Beam, cloud_rays, light_on_surfaces, light_once, opacity_of, sky_behind
-from realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
-from realtime.errors import InputError
-from realtime.methods.interface.method import Layers, Method, View
-from realtime.parameters import parameter
-from realtime.scene.media.bounded import Clouds
-from realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
-from realtime.scene.read_scene import Scene
+from airlight.realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, order_layer
+from airlight.realtime.clouds.density_maps import LightDepths, sun_depths
+from airlight.realtime.clouds.march import CloudSurfaces, cloud_surfaces, segment_by_lengths, segment_through
+from airlight.realtime.clouds.single_scattering import (
+    Beam,
+    cloud_rays,
+    light_on_surfaces,
+    light_once,
+    opacity_of,
+    sky_behind,
+)
+from airlight.realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import Layers, Method, View
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.media.bounded import Clouds
+from airlight.realtime.scene.phase import HenyeyGreenstein, Phase, named_phase
+from airlight.realtime.scene.read_scene import Scene
 
 _ANGLES = 20_000  # of a mean cosine, by the midpoint rule in the root of the angle
 

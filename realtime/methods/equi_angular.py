@@ -24,13 +24,13 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.methods.interface.marching import marched_steps
-from realtime.methods.interface.method import Layers, Method, View, animate
-from realtime.numerics.functions import summed
-from realtime.numerics.noise import PATTERNS
-from realtime.parameters import parameter
-from realtime.scene.light_samples import light_tables
-from realtime.scene.lights import Light
+from airlight.realtime.methods.interface.marching import marched_steps
+from airlight.realtime.methods.interface.method import Layers, Method, View, animate
+from airlight.realtime.numerics.functions import summed
+from airlight.realtime.numerics.noise import PATTERNS
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.light_samples import light_tables
+from airlight.realtime.scene.lights import Light
 
 _STEP = 0.7548776662466927  # 1/g with g^3 = g + 1
 

@@ -3,9 +3,9 @@
 
 from dataclasses import dataclass, field, fields, make_dataclass
 
-from realtime.errors import InputError
-from realtime.methods.interface.method import Method
-from realtime.parameters import Parameters, defaults, parameter
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import Method
+from airlight.realtime.parameters import Parameters, defaults, parameter
 
 ENDING = "+history"
 

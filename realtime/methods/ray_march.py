@@ -30,13 +30,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
-from realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
-from realtime.methods.interface.marching import marched_integral, marched_steps
-from realtime.methods.interface.method import Method, animate, jitter, tolerance
-from realtime.parameters import parameter
-from realtime.scene.media.medium import LitRays
-from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, lit_in_map, map_size
+from airlight.realtime.errors import InputError
+from airlight.realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
+from airlight.realtime.methods.interface.marching import marched_integral, marched_steps
+from airlight.realtime.methods.interface.method import Method, animate, jitter, tolerance
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.media.medium import LitRays
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, lit_in_map, map_size
 
 _DUE = 3  # in the last bits of a step's number: there an interval that has ended is integrated
 

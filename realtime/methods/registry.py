@@ -5,23 +5,23 @@
 own, which is not in it.
 """
 
-from realtime.errors import InputError
-from realtime.methods.cloud_collectors import CloudCollectors
-from realtime.methods.cloud_octaves import CloudOctaves
-from realtime.methods.epipolar.method import MinMax
-from realtime.methods.equi_angular import EquiAngular
-from realtime.methods.froxel_fog.method import FroxelFog
-from realtime.methods.history import ENDING, with_history
-from realtime.methods.interface.method import Method
-from realtime.methods.light_volumes.method import LightVolumes
-from realtime.methods.ray_march import RayMarch
-from realtime.methods.shader.method import shader_method
-from realtime.methods.shader.source import is_shader
-from realtime.methods.shadow_planes.method import ShadowPlanes
-from realtime.methods.soft_shafts.method import SoftShafts
-from realtime.methods.unshadowed import Unshadowed
-from realtime.methods.user_method import user_method
-from realtime.parameters import nearest
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.cloud_collectors import CloudCollectors
+from airlight.realtime.methods.cloud_octaves import CloudOctaves
+from airlight.realtime.methods.epipolar.method import MinMax
+from airlight.realtime.methods.equi_angular import EquiAngular
+from airlight.realtime.methods.froxel_fog.method import FroxelFog
+from airlight.realtime.methods.history import ENDING, with_history
+from airlight.realtime.methods.interface.method import Method
+from airlight.realtime.methods.light_volumes.method import LightVolumes
+from airlight.realtime.methods.ray_march import RayMarch
+from airlight.realtime.methods.shader.method import shader_method
+from airlight.realtime.methods.shader.source import is_shader
+from airlight.realtime.methods.shadow_planes.method import ShadowPlanes
+from airlight.realtime.methods.soft_shafts.method import SoftShafts
+from airlight.realtime.methods.unshadowed import Unshadowed
+from airlight.realtime.methods.user_method import user_method
+from airlight.realtime.parameters import nearest
 
 _ALL = (
     Unshadowed,

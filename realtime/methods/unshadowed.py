@@ -23,9 +23,9 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from realtime.errors import InputError
-from realtime.methods.interface.method import Layers, Method
-from realtime.parameters import parameter
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import Layers, Method
+from airlight.realtime.parameters import parameter
 
 _EXPONENTS = {"wenzel": 0, "quilez": 8, "unreal": 4}  # of the cosine about a sun
 

@@ -28,10 +28,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.errors import InputError, root_of
-from realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
-from realtime.parameters import values
-from realtime.scene.lights import sources_of
+from airlight.realtime.errors import InputError, root_of
+from airlight.realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
+from airlight.realtime.parameters import values
+from airlight.realtime.scene.lights import sources_of
 
 _WANTED = "expected 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
@@ -303,17 +303,7 @@ def user_errors(what: str, file: str | None = None) -> Iterator[None]:
         words = " ".join(str(root).split())
         if isinstance(root, InputError) or type(root).__name__ == InputError.__name__:  # `airlight.InputError` too
             raise InputError(words) from error
-        words += _name_taken(root)
         raise InputError(f"{what}: {_place(root, error, file)}{type(root).__name__}: {words}") from error
-
-
-def _name_taken(error: BaseException) -> str:
-    """Return what to do where a user's package is not found because a package of ours has its name; else nothing."""
-    name = error.name.partition(".")[0] if isinstance(error, ModuleNotFoundError) and error.name else ""
-    page = getattr(sys.modules.get(name), "__file__", None)
-    if page is None or Path(page).parents[1] != Path(__file__).parents[2]:
-        return ""
-    return f"; airlight has a package {name!r} itself, which was found first: rename yours"
 
 
 def _place(root: BaseException, error: BaseException, file: str | None) -> str:

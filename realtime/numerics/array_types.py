@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
+from airlight.realtime.errors import InputError
 
 PRECISIONS = ("single", "double")
 

@@ -25,7 +25,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.array_types import four_numbers, is_single
+from airlight.realtime.numerics.array_types import four_numbers, is_single
 
 TURN = 4.0  #: a full turn
 

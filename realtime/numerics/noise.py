@@ -31,7 +31,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.numerics.array_types import aligned_array
+from airlight.realtime.numerics.array_types import aligned_array
 
 PATTERNS = ("white", "blue", "ign")
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.errors import InputError, root_of
+from airlight.realtime.errors import InputError, root_of
 
 
 class _CollectorPause:

@@ -15,15 +15,15 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.shape import AreaLight, occluder_vertices
-from realtime.errors import InputError
-from realtime.numerics.array_types import aligned_array, types_of
-from realtime.scene.directional_extent import directional_fields, extent_spheres
-from realtime.scene.lights import DirectionalExtent, Light
-from realtime.scene.media.medium import Medium
-from realtime.scene.mesh_adjacency import Occluders
-from realtime.scene.read_scene import Scene
-from realtime.scene.triangle_table import Facets, read_facets, turned_facets
+from airlight.realtime.area_lights.shape import AreaLight, occluder_vertices
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import aligned_array, types_of
+from airlight.realtime.scene.directional_extent import directional_fields, extent_spheres
+from airlight.realtime.scene.lights import DirectionalExtent, Light
+from airlight.realtime.scene.media.medium import Medium
+from airlight.realtime.scene.mesh_adjacency import Occluders
+from airlight.realtime.scene.read_scene import Scene
+from airlight.realtime.scene.triangle_table import Facets, read_facets, turned_facets
 
 Array = NDArray[np.float64]
 

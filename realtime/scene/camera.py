@@ -24,9 +24,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.numerics.array_types import ArrayTypes, host_numbers
-from realtime.transforms import host_matrix
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import ArrayTypes, host_numbers
+from airlight.realtime.transforms import host_matrix
 
 TILE = 16  #: rays in a tile of neighbouring pixels
 SIDE = 4  #: of a tile [pixels]

@@ -25,9 +25,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
-from realtime.scene.mesh_adjacency import mesh_triangles
-from realtime.transforms import turned_outwards
+from airlight.realtime.errors import InputError
+from airlight.realtime.scene.mesh_adjacency import mesh_triangles
+from airlight.realtime.transforms import turned_outwards
 
 Array = NDArray[np.float64]
 

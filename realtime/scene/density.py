@@ -25,10 +25,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
-from realtime.memory import check_memory
-from realtime.numerics.array_types import ArrayTypes, PerRay, aligned_array, bytes_of, four_numbers
-from realtime.scene.closed_mesh import ClosedMesh
+from airlight.realtime.errors import InputError
+from airlight.realtime.memory import check_memory
+from airlight.realtime.numerics.array_types import ArrayTypes, PerRay, aligned_array, bytes_of, four_numbers
+from airlight.realtime.scene.closed_mesh import ClosedMesh
 
 Array = NDArray[np.float64]
 

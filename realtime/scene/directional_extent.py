@@ -18,10 +18,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.numerics.array_types import ArrayTypes, aligned_array
-from realtime.scene.closed_mesh import ClosedMesh
-from realtime.scene.lights import DirectionalExtent
-from realtime.scene.media.light_paths import BoundedMedium
+from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array
+from airlight.realtime.scene.closed_mesh import ClosedMesh
+from airlight.realtime.scene.lights import DirectionalExtent
+from airlight.realtime.scene.media.light_paths import BoundedMedium
 
 Array = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.points import PlacedPoints, place_points
-from realtime.numerics.array_types import ArrayTypes, aligned_array, aligned_numbers, host_numbers, types_of
-from realtime.scene.lights import Facing, Light
-from realtime.scene.read_scene import Scene
+from airlight.realtime.area_lights.points import PlacedPoints, place_points
+from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array, aligned_numbers, host_numbers, types_of
+from airlight.realtime.scene.lights import Facing, Light
+from airlight.realtime.scene.read_scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.numerics.array_types import ArrayTypes, host_numbers
+from airlight.realtime.numerics.array_types import ArrayTypes, host_numbers
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices
-from realtime.errors import InputError
+from airlight.realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices
+from airlight.realtime.errors import InputError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]

@@ -20,10 +20,10 @@ import mitsuba as mi
 import numpy as np
 from drjit.scalar import ArrayXf64
 
-from realtime.droplets import CUT, droplet_table, fraction_cut
-from realtime.errors import InputError
-from realtime.numerics.functions import between_entries, cell_of
-from realtime.scene.rule_reach import Reach, reach_of, shortest
+from airlight.realtime.droplets import CUT, droplet_table, fraction_cut
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.functions import between_entries, cell_of
+from airlight.realtime.scene.rule_reach import Reach, reach_of, shortest
 
 
 class Phase:

@@ -14,9 +14,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.numerics.array_types import ArrayTypes, aligned_array
-from realtime.scene.closed_mesh import (
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array
+from airlight.realtime.scene.closed_mesh import (
     Bounds,
     ClosedMesh,
     encloses,
@@ -27,15 +27,21 @@ from realtime.scene.closed_mesh import (
     read_bounds,
     touches,
 )
-from realtime.scene.density import DensityGrid, along_the_axes, density_on_device, read_cloud_density, read_density
-from realtime.scene.media.bounded import BoundedMedia, Clouds
-from realtime.scene.media.density_grid import GridMedium
-from realtime.scene.media.height_fog import HeightFog, Layer
-from realtime.scene.media.light_paths import BoundedMedium
-from realtime.scene.media.medium import Homogeneous, Medium
-from realtime.scene.mesh_adjacency import scene_of
-from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
-from realtime.transforms import host_matrix
+from airlight.realtime.scene.density import (
+    DensityGrid,
+    along_the_axes,
+    density_on_device,
+    read_cloud_density,
+    read_density,
+)
+from airlight.realtime.scene.media.bounded import BoundedMedia, Clouds
+from airlight.realtime.scene.media.density_grid import GridMedium
+from airlight.realtime.scene.media.height_fog import HeightFog, Layer
+from airlight.realtime.scene.media.light_paths import BoundedMedium
+from airlight.realtime.scene.media.medium import Homogeneous, Medium
+from airlight.realtime.scene.mesh_adjacency import scene_of
+from airlight.realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, named_phase, tabulated
+from airlight.realtime.transforms import host_matrix
 
 _FEW = 4  # lights of a scene that every call may go over
 _PHASES = {

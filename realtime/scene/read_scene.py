@@ -16,26 +16,26 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.area_lights.shape import AreaLight, read_area_light
-from realtime.errors import InputError
-from realtime.numerics.array_types import ArrayTypes, array_types, types_of
-from realtime.scene.camera import Camera, sensor_camera
-from realtime.scene.closed_mesh import ClosedMesh
-from realtime.scene.directional_extent import (
+from airlight.realtime.area_lights.shape import AreaLight, read_area_light
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import ArrayTypes, array_types, types_of
+from airlight.realtime.scene.camera import Camera, sensor_camera
+from airlight.realtime.scene.closed_mesh import ClosedMesh
+from airlight.realtime.scene.directional_extent import (
     directional_fields,
     distance_before,
     media_spheres,
     mesh_spheres,
     shape_spheres,
 )
-from realtime.scene.lights import Light, spot_fields
-from realtime.scene.media.density_grid import GridMedium
-from realtime.scene.media.height_fog import HeightFog
-from realtime.scene.media.medium import Medium
-from realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
-from realtime.scene.rounding import rounding_notes
-from realtime.scene.triangle_table import Facets, read_facets
-from realtime.transforms import beam_axis, host_matrix, spot_axis
+from airlight.realtime.scene.lights import Light, spot_fields
+from airlight.realtime.scene.media.density_grid import GridMedium
+from airlight.realtime.scene.media.height_fog import HeightFog
+from airlight.realtime.scene.media.medium import Medium
+from airlight.realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
+from airlight.realtime.scene.rounding import rounding_notes
+from airlight.realtime.scene.triangle_table import Facets, read_facets
+from airlight.realtime.transforms import beam_axis, host_matrix, spot_axis
 
 _UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that counts as upright in the image
 

@@ -19,8 +19,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
-from realtime.transforms import host_matrix
+from airlight.realtime.errors import InputError
+from airlight.realtime.transforms import host_matrix
 
 Array = NDArray[np.float64]
 

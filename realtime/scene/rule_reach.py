@@ -23,7 +23,7 @@ import numpy as np
 from drjit.scalar import ArrayXf64
 from numpy.typing import NDArray
 
-from realtime.numerics.functions import WIDEST, unit_nodes
+from airlight.realtime.numerics.functions import WIDEST, unit_nodes
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.numerics.array_types import ArrayTypes, aligned_array, four_numbers, types_of
+from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array, four_numbers, types_of
 
 _CORNERS = (0, 0), (1, 0), (0, 1)  # barycentric coordinates u, v
 _FLAT = 1e-5  # length of the difference between the normals of a corner and of the triangle: float32, with room

@@ -25,11 +25,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import bytes_of
-from realtime.scene.light_samples import LightTable
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Rays
-from realtime.shadow_maps.shadow_map import check_size, tiled_corners
+from airlight.realtime.numerics.array_types import bytes_of
+from airlight.realtime.scene.light_samples import LightTable
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Rays
+from airlight.realtime.shadow_maps.shadow_map import check_size, tiled_corners
 
 
 @dataclass(frozen=True)

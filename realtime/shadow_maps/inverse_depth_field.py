@@ -23,9 +23,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import four_numbers, two_numbers
-from realtime.shadow_maps.projection import Projection
-from realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
+from airlight.realtime.numerics.array_types import four_numbers, two_numbers
+from airlight.realtime.shadow_maps.projection import Projection
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
 
 
 @dataclass(frozen=True)

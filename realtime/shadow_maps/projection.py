@@ -26,7 +26,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.scene.lights import Light
+from airlight.realtime.scene.lights import Light
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,18 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
-from realtime.memory import check_memory
-from realtime.numerics.array_types import bytes_of
-from realtime.parameters import parameter
-from realtime.scene.lights import Light
-from realtime.shadow_maps.projection import Projection, cube_coordinates, light_faces, light_projection, map_ray
+from airlight.realtime.errors import InputError
+from airlight.realtime.memory import check_memory
+from airlight.realtime.numerics.array_types import bytes_of
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.projection import (
+    Projection,
+    cube_coordinates,
+    light_faces,
+    light_projection,
+    map_ray,
+)
 
 
 @dataclass(frozen=True)

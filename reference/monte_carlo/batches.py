@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
+from airlight.analytic.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -40,11 +40,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.monte_carlo.batches import Batches, check_samples, single_batch
-from reference.scene.clouds import CloudScene
-from reference.scene.read import ReferenceScene, whole_scene
-from reference.scene.varying import GridMedium, HeightMedium
+from airlight.analytic.errors import InputError
+from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
+from airlight.reference.scene.clouds import CloudScene
+from airlight.reference.scene.read import ReferenceScene, whole_scene
+from airlight.reference.scene.varying import GridMedium, HeightMedium
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.integer]

@@ -12,11 +12,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.kronrod import Pair
-from analytic.panels import Panels, adapted, blocks_by_rule, equal_panels
-from reference.quadrature.pieces import Pieces
-from reference.quadrature.stretches import Profile, Terms, sums_of
-from reference.visibility.planes import Rays
+from airlight.analytic.kronrod import Pair
+from airlight.analytic.panels import Panels, adapted, blocks_by_rule, equal_panels
+from airlight.reference.quadrature.pieces import Pieces
+from airlight.reference.quadrature.stretches import Profile, Terms, sums_of
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

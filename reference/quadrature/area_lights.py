@@ -29,10 +29,16 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.fields import field_of, optical_depth
-from reference.quadrature.light_airlight import worth_of_doubt
-from reference.quadrature.light_samples import Sections, samples_for_rays, sections_for_points, solid_angle, to_sphere
-from reference.quadrature.replicates import (
+from airlight.reference.quadrature.fields import field_of, optical_depth
+from airlight.reference.quadrature.light_airlight import worth_of_doubt
+from airlight.reference.quadrature.light_samples import (
+    Sections,
+    samples_for_rays,
+    sections_for_points,
+    solid_angle,
+    to_sphere,
+)
+from airlight.reference.quadrature.replicates import (
     PILOT,
     REPLICATES,
     Keep,
@@ -42,15 +48,15 @@ from reference.quadrature.replicates import (
     Sums,
     replicate_means,
 )
-from reference.quadrature.stretches import Terms, cosine_profile, sums_of
-from reference.quadrature.surface import Reflection, SurfaceHits
-from reference.scene.area_light import ReferenceAreaLight
-from reference.scene.read import ReferenceScene
-from reference.scene.shapes import distance_to
-from reference.visibility.candidates import Ball
-from reference.visibility.certificate import LitIntervals, RandomChecks
-from reference.visibility.lit_intervals import IN_PLANE, Obstacles, before_light, lit_intervals, obstacles
-from reference.visibility.planes import Rays, before, rays_at
+from airlight.reference.quadrature.stretches import Terms, cosine_profile, sums_of
+from airlight.reference.quadrature.surface import Reflection, SurfaceHits
+from airlight.reference.scene.area_light import ReferenceAreaLight
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.shapes import distance_to
+from airlight.reference.visibility.candidates import Ball
+from airlight.reference.visibility.certificate import LitIntervals, RandomChecks
+from airlight.reference.visibility.lit_intervals import IN_PLANE, Obstacles, before_light, lit_intervals, obstacles
+from airlight.reference.visibility.planes import Rays, before, rays_at
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

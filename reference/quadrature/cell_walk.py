@@ -21,8 +21,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.scene.device import on_device
-from reference.scene.varying import GridMedium
+from airlight.reference.scene.device import on_device
+from airlight.reference.scene.varying import GridMedium
 
 _GAUSS = 12.0**-0.5  # half of the distance of the two nodes over the width
 

@@ -15,13 +15,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.adaptive_panels import sum_pieces
-from reference.quadrature.cell_walk import CellWalk, cell_walk
-from reference.quadrature.pieces import Kinks, Pieces, cut, whole
-from reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
-from reference.scene.device import on_device, vectors
-from reference.scene.varying import GridMedium
-from reference.visibility.planes import Rays
+from airlight.reference.quadrature.adaptive_panels import sum_pieces
+from airlight.reference.quadrature.cell_walk import CellWalk, cell_walk
+from airlight.reference.quadrature.pieces import Kinks, Pieces, cut, whole
+from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
+from airlight.reference.scene.device import on_device, vectors
+from airlight.reference.scene.varying import GridMedium
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -8,11 +8,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.fields import optical_depth
-from reference.scene.area_light import ReferenceAreaLight
-from reference.scene.device import as_rows, vectors
-from reference.scene.read import ReferenceScene, scene_from
-from reference.visibility.distances import half_chord
+from airlight.reference.quadrature.fields import optical_depth
+from airlight.reference.scene.area_light import ReferenceAreaLight
+from airlight.reference.scene.device import as_rows, vectors
+from airlight.reference.scene.read import ReferenceScene, scene_from
+from airlight.reference.visibility.distances import half_chord
 
 Array = NDArray[np.float64]
 

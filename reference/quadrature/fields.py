@@ -13,13 +13,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.density_grid import GridField
-from reference.quadrature.height_fog import HeightField
-from reference.quadrature.homogeneous import HomogeneousField
-from reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms
-from reference.scene.read import ReferenceScene
-from reference.scene.varying import GridMedium, HeightMedium
-from reference.visibility.planes import Rays
+from airlight.reference.quadrature.density_grid import GridField
+from airlight.reference.quadrature.height_fog import HeightField
+from airlight.reference.quadrature.homogeneous import HomogeneousField
+from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.varying import GridMedium, HeightMedium
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
-from reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest, sums_of
-from reference.scene.varying import HeightMedium
-from reference.visibility.planes import Rays
+from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
+from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest, sums_of
+from airlight.reference.scene.varying import HeightMedium
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 

@@ -29,14 +29,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.adaptive_panels import AT_LIGHT, sum_pieces
-from reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
-from reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
-from reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
-from reference.scene.convex_bounds import Bounds, Sphere
-from reference.scene.read import ReferenceScene, homogeneous_around
-from reference.visibility.distances import crossed_facets, crossings, sphere_crossings
-from reference.visibility.planes import Rays
+from airlight.reference.quadrature.adaptive_panels import AT_LIGHT, sum_pieces
+from airlight.reference.quadrature.pieces import Kinks, Pieces, by_medium, cut_pieces, medium_of
+from airlight.reference.quadrature.segments import Segments, camera_segments, depth_through_media, shadow_kinks
+from airlight.reference.quadrature.stretches import TERMS, BoundKind, Stretches, Terms, strongest
+from airlight.reference.scene.convex_bounds import Bounds, Sphere
+from airlight.reference.scene.read import ReferenceScene, homogeneous_around
+from airlight.reference.visibility.distances import crossed_facets, crossings, sphere_crossings
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.quadrature.fields import field_of
-from reference.quadrature.ray_values import Progress, RayValues, ReferenceImage, ray_values
-from reference.quadrature.replicates import (
+from airlight.analytic.errors import InputError
+from airlight.reference.quadrature.fields import field_of
+from airlight.reference.quadrature.ray_values import Progress, RayValues, ReferenceImage, ray_values
+from airlight.reference.quadrature.replicates import (
     PILOT,
     REPLICATES,
     Keep,
@@ -26,11 +26,11 @@ from reference.quadrature.replicates import (
     replicate_means,
     standard_error,
 )
-from reference.quadrature.stretches import BoundKind
-from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.read import ReferenceScene
-from reference.scene.shapes import read_shapes
-from reference.visibility.certificate import RandomChecks
+from airlight.reference.quadrature.stretches import BoundKind
+from airlight.reference.scene.camera import film_directions, pixel_centres
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.shapes import read_shapes
+from airlight.reference.visibility.certificate import RandomChecks
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.fields import field_of
-from reference.quadrature.stretches import Stretches, Terms, lit_stretches, profile_of
-from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import ReferenceLight, ReferenceScene
-from reference.scene.shapes import Shapes, read_shapes
-from reference.visibility.candidates import Ball
-from reference.visibility.certificate import LitIntervals, coordinates
-from reference.visibility.lit_intervals import Obstacles, lit_intervals, obstacles, reaches
-from reference.visibility.planes import Rays, cone_interval, rays_at
+from airlight.reference.quadrature.fields import field_of
+from airlight.reference.quadrature.stretches import Stretches, Terms, lit_stretches, profile_of
+from airlight.reference.scene.directional_light import DirectionalLight
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.shapes import Shapes, read_shapes
+from airlight.reference.visibility.candidates import Ball
+from airlight.reference.visibility.certificate import LitIntervals, coordinates
+from airlight.reference.visibility.lit_intervals import Obstacles, lit_intervals, obstacles, reaches
+from airlight.reference.visibility.planes import Rays, cone_interval, rays_at
 
 Array = NDArray[np.float64]
 

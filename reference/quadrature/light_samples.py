@@ -58,10 +58,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.mesh_choice import Choice, choose_for_points, choose_for_rays, places_in
-from reference.scene.area_light import ReferenceAreaLight
-from reference.visibility.certificate import LitIntervals
-from reference.visibility.lit_intervals import IN_PLANE
+from airlight.reference.quadrature.mesh_choice import Choice, choose_for_points, choose_for_rays, places_in
+from airlight.reference.scene.area_light import ReferenceAreaLight
+from airlight.reference.visibility.certificate import LitIntervals
+from airlight.reference.visibility.lit_intervals import IN_PLANE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.area_light import ReferenceAreaLight, triangle_normals
+from airlight.reference.scene.area_light import ReferenceAreaLight, triangle_normals
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -10,10 +10,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.segments import AMBIENT, Segments, depth_through_media
-from reference.quadrature.stretches import Stretches
-from reference.scene.read import ReferenceMedium, ReferenceScene, homogeneous_around
-from reference.visibility.planes import Rays
+from airlight.reference.quadrature.segments import AMBIENT, Segments, depth_through_media
+from airlight.reference.quadrature.stretches import Stretches
+from airlight.reference.scene.read import ReferenceMedium, ReferenceScene, homogeneous_around
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -23,18 +23,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.area_lights import area_airlight, area_surface, beams_of
-from reference.quadrature.emission import emitted_light
-from reference.quadrature.light_airlight import light_airlight
-from reference.quadrature.replicates import Keep, PointPlan
-from reference.quadrature.sky import sky_light
-from reference.quadrature.stretches import BoundKind
-from reference.quadrature.surface import lit_surface, surface_hits
-from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import ReferenceLight, ReferenceScene
-from reference.scene.shapes import Shapes, read_shapes
-from reference.visibility.certificate import RandomChecks, reached_by_shadow_rays
-from reference.visibility.distances import exact_distance
+from airlight.reference.quadrature.area_lights import area_airlight, area_surface, beams_of
+from airlight.reference.quadrature.emission import emitted_light
+from airlight.reference.quadrature.light_airlight import light_airlight
+from airlight.reference.quadrature.replicates import Keep, PointPlan
+from airlight.reference.quadrature.sky import sky_light
+from airlight.reference.quadrature.stretches import BoundKind
+from airlight.reference.quadrature.surface import lit_surface, surface_hits
+from airlight.reference.scene.directional_light import DirectionalLight
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.shapes import Shapes, read_shapes
+from airlight.reference.visibility.certificate import RandomChecks, reached_by_shadow_rays
+from airlight.reference.visibility.distances import exact_distance
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

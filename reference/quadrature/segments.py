@@ -20,10 +20,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
-from reference.scene.read import ReferenceScene
-from reference.visibility.distances import crossings, half_chord
-from reference.visibility.planes import Rays
+from airlight.reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.visibility.distances import crossings, half_chord
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

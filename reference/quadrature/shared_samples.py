@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.mesh_choice import choose_by_area, places_in
-from reference.scene.area_light import ReferenceAreaLight
-from reference.scene.read import ReferenceLight
+from airlight.reference.quadrature.mesh_choice import choose_by_area, places_in
+from airlight.reference.scene.area_light import ReferenceAreaLight
+from airlight.reference.scene.read import ReferenceLight
 
 Array = NDArray[np.float64]
 

@@ -28,13 +28,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.fields import optical_depth
-from reference.quadrature.light_airlight import light_airlight
-from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
-from reference.quadrature.surface import UNBOUNDED, Reflection, SurfaceHits
-from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import ReferenceScene
-from reference.scene.shapes import Shapes
+from airlight.reference.quadrature.fields import optical_depth
+from airlight.reference.quadrature.light_airlight import light_airlight
+from airlight.reference.quadrature.replicates import REPLICATES, PointPlan, square_points
+from airlight.reference.quadrature.surface import UNBOUNDED, Reflection, SurfaceHits
+from airlight.reference.scene.directional_light import DirectionalLight
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.shapes import Shapes
 
 Array = NDArray[np.float64]
 Fraction = Callable[[float], None]

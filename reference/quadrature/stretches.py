@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.read import ReferenceLight, ReferenceMedium
-from reference.scene.varying import VaryingMedium
-from reference.visibility.certificate import LitIntervals
-from reference.visibility.planes import Rays, cone_interval, falloff
+from airlight.reference.scene.read import ReferenceLight, ReferenceMedium
+from airlight.reference.scene.varying import VaryingMedium
+from airlight.reference.visibility.certificate import LitIntervals
+from airlight.reference.visibility.planes import Rays, cone_interval, falloff
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -17,11 +17,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.fields import optical_depth
-from reference.scene.area_light import is_area
-from reference.scene.device import as_rows, on_device, vectors
-from reference.scene.directional_light import DirectionalLight, is_directional
-from reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.quadrature.fields import optical_depth
+from airlight.reference.scene.area_light import is_area
+from airlight.reference.scene.device import as_rows, on_device, vectors
+from airlight.reference.scene.directional_light import DirectionalLight, is_directional
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -13,9 +13,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.scene.colours import colour
-from reference.scene.transforms import SAME, matrix_of, outwards
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.colours import colour
+from airlight.reference.scene.transforms import SAME, matrix_of, outwards
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.transforms import matrix_of
+from airlight.reference.scene.transforms import matrix_of
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
-from reference.scene.read import (
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from airlight.reference.scene.directional_light import DirectionalLight, is_directional, read_directional
+from airlight.reference.scene.read import (
     VACUUM,
     ReferenceMedium,
     read_medium,
@@ -26,7 +26,7 @@ from reference.scene.read import (
     scene_of,
     sorted_shapes,
 )
-from reference.scene.varying import grid_values
+from airlight.reference.scene.varying import grid_values
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.scene.transforms import SAME, matrix_of, outwards
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.transforms import SAME, matrix_of, outwards
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -14,15 +14,15 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from analytic.phase import PhaseFunction
-from reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
-from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.colours import colour
-from reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
-from reference.scene.directional_light import DirectionalLight, is_directional, read_directional
-from reference.scene.transforms import SAME, matrix_of, stretch
-from reference.scene.varying import (
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import PhaseFunction
+from airlight.reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
+from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from airlight.reference.scene.colours import colour
+from airlight.reference.scene.convex_bounds import Bounds, holds, in_surface, read_bounds
+from airlight.reference.scene.directional_light import DirectionalLight, is_directional, read_directional
+from airlight.reference.scene.transforms import SAME, matrix_of, stretch
+from airlight.reference.scene.varying import (
     NO_EXTINCTION,
     GridMedium,
     HeightMedium,

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import CodeType
 
 _ROOT = Path(__file__).resolve().parents[2]
-_PACKAGES = ("analytic", "realtime", "reference", "validation", "reports")
+_FOLDERS = ("analytic", "realtime", "reference", "validation", "reports")  # of the package `airlight`
 _VERSIONS = ("mitsuba", "drjit", "numpy", "scipy")
 _CODE = (".py", ".pyc")
 
@@ -118,9 +118,10 @@ def _source(path: Path) -> bytes:
 @lru_cache(maxsize=1)
 def _modules() -> dict[str, Path]:
     """Return the files of our modules by name, those of packages too."""
-    paths = [path for package in _PACKAGES for path in (_ROOT / package).rglob("*.py")]
-    return {".".join(path.relative_to(_ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in paths}
+    paths = [path for folder in _FOLDERS for path in (_ROOT / folder).rglob("*.py")]
+    parts = {path: path.relative_to(_ROOT).with_suffix("").parts for path in paths}
+    return {".".join(["airlight", *names]).removesuffix(".__init__"): path for path, names in parts.items()}
 
 
 def _is_ours(path: Path) -> bool:
-    return path.is_relative_to(_ROOT) and path.relative_to(_ROOT).parts[0] in _PACKAGES
+    return path.is_relative_to(_ROOT) and path.relative_to(_ROOT).parts[0] in _FOLDERS

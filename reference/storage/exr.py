@@ -22,8 +22,8 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.storage.files import NO_SPACE, atomic_path
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.files import NO_SPACE, atomic_path
 
 TOTAL = "total"  #: the layer in the plain channels R, G, B
 NOTE = "airlight:read"  #: the attribute in which the reader says what it changed or left out

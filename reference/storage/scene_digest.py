@@ -18,7 +18,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.storage.store import Content
+from airlight.reference.storage.store import Content
 
 #: Plugins without an id are named by their address, which differs from run to run.
 _ADDRESS = re.compile(r"object_\d+|0x[0-9a-f]+")

@@ -33,9 +33,9 @@ from typing import Any, ClassVar, Generic, TypeVar
 import msgspec
 import numpy as np
 
-from analytic.clock import Spent, stopwatch
-from reference.storage.cache import drop_arrays, drop_parts, is_stored, load_arrays, store_arrays
-from reference.storage.code import source_digest
+from airlight.analytic.clock import Spent, stopwatch
+from airlight.reference.storage.cache import drop_arrays, drop_parts, is_stored, load_arrays, store_arrays
+from airlight.reference.storage.code import source_digest
 
 _FORMAT = 2  # of keys and of what is stored under them: another one, and everything is computed again
 _FRESH = "AIRLIGHT_FRESH"  # results that are older count as missing [s since 1970]; child processes inherit it

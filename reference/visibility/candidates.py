@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.shapes import Shapes
+from airlight.reference.scene.shapes import Shapes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -15,9 +15,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.device import on_device, vectors
-from reference.scene.shapes import Shapes
-from reference.visibility.planes import Rays
+from airlight.reference.scene.device import on_device, vectors
+from airlight.reference.scene.shapes import Shapes
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

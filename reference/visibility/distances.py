@@ -11,9 +11,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
-from reference.scene.read import ReferenceScene
-from reference.scene.shapes import Disks, Shapes, is_rectangle, read_shapes
+from airlight.reference.scene.convex_bounds import Bounds, Polyhedron, Sphere
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.shapes import Disks, Shapes, is_rectangle, read_shapes
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

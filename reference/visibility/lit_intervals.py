@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.area_light import ReferenceAreaLight
-from reference.scene.convex_bounds import Sphere
-from reference.scene.read import ReferenceScene, scene_of
-from reference.scene.shapes import Shapes, read_shapes
-from reference.visibility.candidates import Ball, Near, near_shapes
-from reference.visibility.certificate import LitIntervals, certified
-from reference.visibility.distances import crossings
-from reference.visibility.planes import Rays
-from reference.visibility.shadows import lit_parts
+from airlight.reference.scene.area_light import ReferenceAreaLight
+from airlight.reference.scene.convex_bounds import Sphere
+from airlight.reference.scene.read import ReferenceScene, scene_of
+from airlight.reference.scene.shapes import Shapes, read_shapes
+from airlight.reference.visibility.candidates import Ball, Near, near_shapes
+from airlight.reference.visibility.certificate import LitIntervals, certified
+from airlight.reference.visibility.distances import crossings
+from airlight.reference.visibility.planes import Rays
+from airlight.reference.visibility.shadows import lit_parts
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

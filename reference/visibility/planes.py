@@ -31,7 +31,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.read import ReferenceLight
+from airlight.reference.scene.read import ReferenceLight
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -37,10 +37,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.device import on_device, vectors
-from reference.scene.shapes import Shapes
-from reference.visibility.candidates import Near
-from reference.visibility.planes import Rays
+from airlight.reference.scene.device import on_device, vectors
+from airlight.reference.scene.shapes import Shapes
+from airlight.reference.visibility.candidates import Near
+from airlight.reference.visibility.planes import Rays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from analytic.errors import InputError, named_values
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError, named_values
+from airlight.reports.api.inputs import (
     File,
     Files,
     ImageLike,
@@ -27,9 +27,9 @@ from reports.api.inputs import (
 )
 
 if TYPE_CHECKING:
-    from reference.storage.exr import Image
-    from reports.api.comparisons import Fitted, ImageComparison, SceneComparison
-    from reports.tables.record import Said
+    from airlight.reference.storage.exr import Image
+    from airlight.reports.api.comparisons import Fitted, ImageComparison, SceneComparison
+    from airlight.reports.tables.record import Said
 
 
 @one_error
@@ -145,8 +145,8 @@ def compare(
         return _two_images(reference, test, layer, files=files, **options)
     how = {"layer": layer, "holds": holds, "pixel": pixel}
     with _as_file(test) as (path, name):
-        from reference.storage.exr import read_exr
-        from reports.machine.environment import activate
+        from airlight.reference.storage.exr import read_exr
+        from airlight.reports.machine.environment import activate
 
         read_exr(path)  # unreadable files are refused before Mitsuba starts
         activate()
@@ -164,10 +164,10 @@ def _several(scene: str, test: Any, frames: Any, *, progress: Any, **how: Any) -
     """Compare frames that `frames` tells of, or independent renders."""
     if not isinstance(test, str | os.PathLike):
         raise InputError("frames: expected the files of all frames, such as 'frames/####.exr'; save the images first")
-    from reports.api.comparisons import frames_comparison
-    from reports.machine.environment import activate
-    from validation.motion.judge import compare_frames
-    from validation.motion.noise import compare_runs
+    from airlight.reports.api.comparisons import frames_comparison
+    from airlight.reports.machine.environment import activate
+    from airlight.validation.motion.judge import compare_frames
+    from airlight.validation.motion.noise import compare_runs
 
     activate()
     with telling(progress, "the files") as tell:
@@ -195,8 +195,8 @@ def _as_file(image: Any) -> Iterator[tuple[Path, str]]:
     if isinstance(image, str | os.PathLike):
         yield Path(image), str(image)
         return
-    from reference.storage.exr import write_exr
-    from reference.storage.files import temporary_folder
+    from airlight.reference.storage.exr import write_exr
+    from airlight.reference.storage.files import temporary_folder
 
     layers, name = as_image(image, "airlight", "the test image")
     with temporary_folder() as folder:
@@ -215,8 +215,8 @@ def as_image(image: Any, layer: str | None, name: str) -> "tuple[Image, str]":
     """
     import numpy as np
 
-    from reference.storage.exr import Image, read_exr
-    from reports.api.results import LayeredImage
+    from airlight.reference.storage.exr import Image, read_exr
+    from airlight.reports.api.results import LayeredImage
 
     if isinstance(image, LayeredImage):
         return image.with_total(), image.title
@@ -237,7 +237,7 @@ def _mask(mask: Any) -> Any:
     """Return truth values, (height, width), or None."""
     import numpy as np
 
-    from validation.comparison.images import read_mask
+    from airlight.validation.comparison.images import read_mask
 
     if mask is None or not isinstance(mask, str | os.PathLike):
         return None if mask is None else np.asarray(mask)
@@ -247,9 +247,9 @@ def _mask(mask: Any) -> Any:
 def _two_images(
     reference: Any, test: Any, layer: str | None, *, mask: Any, files: list[Path], **options: Any
 ) -> "ImageComparison":
-    from reference.storage.exr import layer as image_layer
-    from reports.api.comparisons import ImageComparison, write_difference
-    from validation.comparison.images import compare_images
+    from airlight.reference.storage.exr import layer as image_layer
+    from airlight.reports.api.comparisons import ImageComparison, write_difference
+    from airlight.validation.comparison.images import compare_images
 
     exact, exact_name = as_image(reference, layer, "the reference")
     tested, test_name = as_image(test, layer, "the test image")
@@ -265,8 +265,8 @@ def _two_images(
 def _with_scene(
     scene: str, path: Path, name: str, *, mask: Any, files: list[Path], progress: Any, **options: Any
 ) -> "SceneComparison":
-    from reports.api.comparisons import scene_comparison, write_difference
-    from validation.engine.judge import compare_scene
+    from airlight.reports.api.comparisons import scene_comparison, write_difference
+    from airlight.validation.engine.judge import compare_scene
 
     if mask is not None and not isinstance(mask, str | os.PathLike):
         raise InputError("mask: an image is compared with a scene under a mask that is an EXR file; save it first")
@@ -279,8 +279,8 @@ def _with_scene(
 
 
 def _diagnose(scene: str, path: Path, name: str, *, progress: Any, **how: Any) -> "Said":
-    from reports.api.comparisons import diagnosed
-    from validation.engine.diagnose import diagnose_file
+    from airlight.reports.api.comparisons import diagnosed
+    from airlight.validation.engine.diagnose import diagnose_file
 
     with telling(progress, "diagnosis") as tell:
         found = diagnose_file(path, scene, progress=tell, **how)
@@ -296,12 +296,12 @@ def _fit(
         "fit", [word for word in words if "=" in word], float, "NAME or NAME=VALUE, such as sigma_t=0.1"
     )
     layers, name = as_image(image, layer, "the image")  # before Mitsuba starts
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     activate()
-    from reports.api.comparisons import fitted
-    from validation.engine.seen import judged_layer, scene_of_size
-    from validation.fit.fit import fit_image
+    from airlight.reports.api.comparisons import fitted
+    from airlight.validation.engine.seen import judged_layer, scene_of_size
+    from airlight.validation.fit.fit import fit_image
 
     size = judged_layer(layers, name, name=layer, holds=how["holds"]).size
     loaded = scene_of_size(str(scene), size, name)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from reference.storage.exr import Image
-from reports.api.results import Array, Pictured, as_array, read_only
-from reports.plotting.pictures import (
+from airlight.reference.storage.exr import Image
+from airlight.reports.api.results import Array, Pictured, as_array, read_only
+from airlight.reports.plotting.pictures import (
     ERROR_CEILING,
     ERROR_FLOOR,
     error_map,
@@ -22,17 +22,17 @@ from reports.plotting.pictures import (
     tone_mapped,
     write_png,
 )
-from reports.tables.record import Said
-from reports.tables.table import Interval, numbers, table, words
-from validation.columns import plain
-from validation.comparison.images import Comparison, shown
-from validation.engine.diagnose import Diagnosis
-from validation.engine.judge import EngineComparison
-from validation.fit.fit import Fit
-from validation.fit.fit import Fitted as FittedParameter
-from validation.metrics.errors import Metrics, colours
-from validation.motion.judge import MotionComparison
-from validation.motion.noise import NoiseComparison
+from airlight.reports.tables.record import Said
+from airlight.reports.tables.table import Interval, numbers, table, words
+from airlight.validation.columns import plain
+from airlight.validation.comparison.images import Comparison, shown
+from airlight.validation.engine.diagnose import Diagnosis
+from airlight.validation.engine.judge import EngineComparison
+from airlight.validation.fit.fit import Fit
+from airlight.validation.fit.fit import Fitted as FittedParameter
+from airlight.validation.metrics.errors import Metrics, colours
+from airlight.validation.motion.judge import MotionComparison
+from airlight.validation.motion.noise import NoiseComparison
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -81,7 +81,7 @@ class ImageComparison(Comparison, Pictured):
         return colours(reference), colours(test)
 
     def _repr_html_(self) -> str:
-        from reports.tables.record import block, bullets, picture
+        from airlight.reports.tables.record import block, bullets, picture
 
         reference, test = self._colours()
         factor, width = exposure(reference), reference.shape[1]
@@ -189,7 +189,7 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
         return (
             f"signed relative error, blue too dark, red too bright, from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
         )
-    from reference.storage.exr import write_exr
+    from airlight.reference.storage.exr import write_exr
 
     relative = relative_error(np.where(seen, reference, np.nan), test)
     compared = ~np.isnan(relative)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError
+from airlight.reports.api.inputs import (
     Files,
     KernelLike,
     MethodLike,
@@ -22,7 +22,7 @@ from reports.api.inputs import (
     output_files,
     pixels_of,
 )
-from reports.tables.record import Said
+from airlight.reports.tables.record import Said
 
 
 @one_error
@@ -51,12 +51,12 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
         For a scene without a reference, with the name of what is in the way.
     """
     files = output_files(output, ".glb", ".vol")
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     activate()
-    from reports.api.scenes import opened
-    from reports.interchange.gltf import write_gltf
-    from reports.interchange.scene import describe_scene
+    from airlight.reports.api.scenes import opened
+    from airlight.reports.interchange.gltf import write_gltf
+    from airlight.reports.interchange.scene import describe_scene
 
     loaded = opened(scene, size)
     described = describe_scene(loaded)
@@ -69,7 +69,7 @@ def describe(scene: SceneLike, *, size: Size | None = None, output: Files = (), 
 
 def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid: str) -> Said:
     """Return a description, with the glTF file and the medium that reads the volume file, as XML."""
-    from reports.interchange.words import description_table
+    from airlight.reports.interchange.words import description_table
 
     command = shlex.join(["airlight", "compare", described["source"], described["file"]["name"]])
     lines = [f"to judge it: {command}"]
@@ -84,9 +84,9 @@ def _said(described: Mapping[str, Any], written: Mapping[str, Any] | None, grid:
 
 
 def _write_grid(path: Path, scene: Any) -> str:
-    from reference.scene.read import read_reference
-    from reference.scene.varying import GridMedium, HeightMedium
-    from reports.interchange.fog_grid import write_fog_grid
+    from airlight.reference.scene.read import read_reference
+    from airlight.reference.scene.varying import GridMedium, HeightMedium
+    from airlight.reports.interchange.fog_grid import write_fog_grid
 
     medium = read_reference(scene).medium
     if not isinstance(medium, HeightMedium | GridMedium):
@@ -133,7 +133,7 @@ def view(
     parameters
         Parameters of the method.
     """
-    from reports.machine.environment import activate, require
+    from airlight.reports.machine.environment import activate, require
 
     require("websockets", "view", "the live view")
     host, _, digits = address.rpartition(":")
@@ -142,9 +142,9 @@ def view(
     chosen = configuration_of(method, kernel, parameters)
     changes, pixels = changes_of(change), pixels_of(size)
     variant = activate()
-    from reports.view.server import Server
-    from reports.view.session import Session
-    from reports.view.widgets import ViewState
+    from airlight.reports.view.server import Server
+    from airlight.reports.view.session import Session
+    from airlight.reports.view.widgets import ViewState
 
     assert pixels is not None
     session = Session(ViewState(str(scene), pixels, chosen, changes), variant)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from analytic.errors import InputError
-from reports import __version__
-from reports.api.inputs import Files, one_error, output_files
-from reports.tables.record import Result
+from airlight.analytic.errors import InputError
+from airlight.reports import __version__
+from airlight.reports.api.inputs import Files, one_error, output_files
+from airlight.reports.tables.record import Result
 
 #: The largest errors, as `python -m tests.helpers.exported` measured them.
 MEASURED = Path(__file__).parents[1] / "data" / "exported.json"
@@ -80,9 +80,9 @@ def export(
     >>> "float al_integral(" in airlight.export("exact", phase="hg").code
     True
     """
-    from realtime.export.text import kernel_text
-    from realtime.scene.phase import named_phase
-    from reference.storage.files import write_text
+    from airlight.realtime.export.text import kernel_text
+    from airlight.realtime.scene.phase import named_phase
+    from airlight.reference.storage.files import write_text
 
     if phase.startswith(("hg:", "tabulated", "mie")):
         raise InputError(
@@ -112,7 +112,7 @@ def _head(kernel: str, language: str, phase: str, measured: str) -> str:
 
 def _measured(kernel: str, phase: str) -> tuple[float | None, str]:
     """Return the largest error of a kernel that was measured, and a sentence."""
-    from realtime.export.text import CONFORMING
+    from airlight.realtime.export.text import CONFORMING
 
     data = json.loads(MEASURED.read_text(encoding="utf-8"))
     entry = data["errors"].get(kernel, {}).get(phase)
@@ -129,10 +129,10 @@ def _rows(phase: str) -> list[tuple[float, ...]]:
     """Return eight certified rays; of a phase function without any, rays with the integral to 1e-10."""
     import numpy as np
 
-    from analytic.panels import airlight_segments
-    from analytic.phase import phase_from_words
-    from validation.certified.files import certified_data
-    from validation.kernels.case_files import read_cases
+    from airlight.analytic.panels import airlight_segments
+    from airlight.analytic.phase import phase_from_words
+    from airlight.validation.certified.files import certified_data
+    from airlight.validation.kernels.case_files import read_cases
 
     cases = read_cases(certified_data("airlight_integral.csv"))
     assert cases.tag is not None

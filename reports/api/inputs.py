@@ -14,16 +14,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
-from analytic.errors import InputError
-from reports.machine.progress import progress_bar
+from airlight.analytic.errors import InputError
+from airlight.reports.machine.progress import progress_bar
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from reference.storage.exr import Image
-    from reports.api.results import LayeredImage
-    from validation.scenes.loading import LoadedScene
-    from validation.study.configuration import Configuration
+    from airlight.reference.storage.exr import Image
+    from airlight.reports.api.results import LayeredImage
+    from airlight.validation.scenes.loading import LoadedScene
+    from airlight.validation.study.configuration import Configuration
 
     #: A built-in name, random:SEED, the path of a Mitsuba XML file, a Mitsuba dictionary, an `mi.Scene`, or what
     #: `load_scene` returned.
@@ -67,13 +67,13 @@ def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
         try:
             return function(*arguments, **named)
         except Exception as error:  # only these two are changed; naming them here would import `realtime` at each start
-            from realtime.errors import InputError as RealtimeInputError
-            from realtime.errors import NoDriverError
+            from airlight.realtime.errors import InputError as RealtimeInputError
+            from airlight.realtime.errors import NoDriverError
 
             if isinstance(error, RealtimeInputError):
                 raise InputError(str(error)) from error
             if isinstance(error, NoDriverError):
-                from reports.machine.opengl import missing
+                from airlight.reports.machine.opengl import missing
 
                 raise missing(str(error)) from error
             raise
@@ -86,7 +86,7 @@ def with_kernels(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     @functools.wraps(function)
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
-        from reports.machine.environment import activate
+        from airlight.reports.machine.environment import activate
 
         activate()
         return function(*arguments, **named)
@@ -123,7 +123,7 @@ def _is_given(value: Any) -> bool:
 
 def output_files(output: Any, *endings: str) -> list[Path]:
     """Return the files to write, once each is known to have an ending, such as '.png (a picture)', and a place."""
-    from reference.storage.files import ensure_writable
+    from airlight.reference.storage.files import ensure_writable
 
     files = [Path(path) for path in several(output)]
     for path in files:
@@ -145,7 +145,7 @@ def listed(name: str, words: Any) -> list[str]:
 def pixels_of(size: Any) -> tuple[int, int] | None:
     """Return two whole numbers or 'WxH' as width and height [pixels], None for None."""
     if size is None or isinstance(size, str):
-        from validation.scenes.loading import parse_size
+        from airlight.validation.scenes.loading import parse_size
 
         return None if size is None else parse_size(size)
     try:
@@ -159,7 +159,7 @@ def pixels_of(size: Any) -> tuple[int, int] | None:
 
 def changes_of(change: Any) -> dict[str, tuple[float, ...]]:
     """Return the changes of a scene by name."""
-    from validation.scenes.changes import parse_changes
+    from airlight.validation.scenes.changes import parse_changes
 
     if isinstance(change, Mapping):
         change = [f"{name}={_numbers(value)}" for name, value in change.items()]
@@ -184,7 +184,7 @@ def kernel_name(kernel: Any) -> str | None:
 
 def configuration_of(method: Any, kernel: Any, parameters: Any) -> "Configuration":
     """Return a configuration of a method, or the one that is given, which excludes a kernel and parameters."""
-    from validation.study.configuration import Configuration, configuration
+    from airlight.validation.study.configuration import Configuration, configuration
 
     if not isinstance(method, Configuration):
         return configuration(method, kernel_name(kernel), parameters or {})

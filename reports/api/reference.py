@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from analytic.errors import InputError, nearest
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError, nearest
+from airlight.reports.api.inputs import (
     Files,
     Progress,
     SceneLike,
@@ -23,10 +23,10 @@ from reports.api.inputs import (
 )
 
 if TYPE_CHECKING:
-    from reports.api.results import Reference
-    from reports.cluster.connect import Client
-    from validation.estimates.images import Budget
-    from validation.scenes.loading import LoadedScene
+    from airlight.reports.api.results import Reference
+    from airlight.reports.cluster.connect import Client
+    from airlight.validation.estimates.images import Budget
+    from airlight.validation.scenes.loading import LoadedScene
 
 USUAL_SAMPLES = 2048  #: samples a pixel of a sampling estimator without a budget
 USUAL_CLOUD_SAMPLES = 256  #: of one that traces clouds
@@ -120,7 +120,7 @@ def reference(
         raise InputError(f"orders: {estimator} knows single scattering alone; take cloud-paths or volpath")
     place = None
     if cluster is not None:
-        from reports.cluster.connect import parse_place
+        from airlight.reports.cluster.connect import parse_place
 
         if seconds is not None:
             raise InputError("seconds: how many batches workers trace in a time is chance; give samples with a cluster")
@@ -138,11 +138,11 @@ def reference(
     else:
         exclude("quadrature", "draws no samples", {**budgets, "seed": seed or None})
     changes = changes_of(change)
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     activate()
-    from realtime.scene.read_scene import scene_notes
-    from reports.api.scenes import opened
+    from airlight.realtime.scene.read_scene import scene_notes
+    from airlight.reports.api.scenes import opened
 
     loaded = opened(scene, pixels_of(size), changes)
     note(progress, scene_notes(loaded.scene))
@@ -159,7 +159,7 @@ def reference(
     with telling(progress, f"{loaded.name}: {estimator}") as tell:
         if place is None:
             return compute(tell)
-        from reports.cluster.connect import connected
+        from airlight.reports.cluster.connect import connected
 
         with connected(place) as workers:
             return compute(tell, workers)
@@ -167,7 +167,7 @@ def reference(
 
 def _check_work(loaded: Any, estimator: str, pixel: str, budget: "Budget | None", *, clouds: bool) -> tuple[str, ...]:
     """Refuse what takes too long, and return what a user should know of the time."""
-    from validation.study.cost import check_work, reference_work, sampled_work
+    from airlight.validation.study.cost import check_work, reference_work, sampled_work
 
     size = loaded.size if loaded.scene.sensors() else (1, 1)
     if budget is None:
@@ -191,8 +191,8 @@ def _elsewhere(
     orders: str | None,
 ) -> Any:
     """Let workers compute what is not in the cache: a quadrature at once, batches as they are asked for."""
-    from reports.cluster.references import bring_references, image_of, tracing
-    from validation.estimates.images import batch_plan, cloud_orders
+    from airlight.reports.cluster.references import bring_references, image_of, tracing
+    from airlight.validation.estimates.images import batch_plan, cloud_orders
 
     width, height = (int(side) for side in loaded.scene.sensors()[0].film().size())
     image = image_of(loaded, (width, height), changes)
@@ -206,10 +206,10 @@ def _elsewhere(
 
 
 def _quadrature(loaded: "LoadedScene", pixel: str, tell: Callable[[float, str], None]) -> "Reference":
-    from reports.api.results import Reference, sealed
-    from reports.report.scene import reference_record
-    from validation.estimates.images import layered_reference
-    from validation.estimates.quadrature import reference_image
+    from airlight.reports.api.results import Reference, sealed
+    from airlight.reports.report.scene import reference_record
+    from airlight.validation.estimates.images import layered_reference
+    from airlight.validation.estimates.quadrature import reference_image
 
     found = reference_image(loaded.scene, pixel=pixel, progress=lambda done, total, what: tell(done / total, what))
     said = reference_record(found)
@@ -232,8 +232,8 @@ def _sampled(
     tell: Callable[[float, str], None],
     elsewhere: Any,
 ) -> "Reference":
-    from reports.api.results import Reference, sealed
-    from validation.estimates.images import cloud_orders, monte_carlo_reference
+    from airlight.reports.api.results import Reference, sealed
+    from airlight.validation.estimates.images import cloud_orders, monte_carlo_reference
 
     chosen = cloud_orders(orders) if orders else None
     found = monte_carlo_reference(
@@ -251,9 +251,9 @@ def _sampled(
 
 def _merged(scene: str, files: list[Path]) -> "Reference":
     """Return the samples of several files together, computed from their single precision."""
-    from reference.storage.exr import read_exr
-    from reports.api.results import Reference, sealed
-    from validation.estimates.merge import merged_references
+    from airlight.reference.storage.exr import read_exr
+    from airlight.reports.api.results import Reference, sealed
+    from airlight.validation.estimates.merge import merged_references
 
     image = merged_references([(str(path), read_exr(path)) for path in files])
     made = str(image.attributes["airlight:scene"])
@@ -268,6 +268,6 @@ def _merged(scene: str, files: list[Path]) -> "Reference":
 
 
 def _budget(given: dict[str, Any], *, usual: int) -> "Budget":
-    from validation.estimates.images import Budget
+    from airlight.validation.estimates.images import Budget
 
     return Budget(**({"samples": usual} if all(value is None for value in given.values()) else given))

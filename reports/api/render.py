@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from analytic.errors import InputError
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError
+from airlight.reports.api.inputs import (
     Files,
     KernelLike,
     MethodLike,
@@ -35,10 +35,10 @@ from reports.api.inputs import (
 )
 
 if TYPE_CHECKING:
-    from reports.api.results import RenderedFrames, Rendering
-    from reports.api.scenes import OpenScene
-    from reports.tables.record import Said
-    from validation.study.configuration import Configuration
+    from airlight.reports.api.results import RenderedFrames, Rendering
+    from airlight.reports.api.scenes import OpenScene
+    from airlight.reports.tables.record import Said
+    from airlight.validation.study.configuration import Configuration
 
 _STAGES = ("surface", "shade", "render")  # the recorded functions of a frame
 
@@ -69,7 +69,7 @@ def load_scene(scene: SceneLike, size: Size | None = None) -> "OpenScene":
     >>> scene.plan()["lights"]
     '1 point'
     """
-    from reports.api.scenes import opened
+    from airlight.reports.api.scenes import opened
 
     return opened(scene, size)
 
@@ -156,11 +156,11 @@ def render(
     for name, number in (("run", run), ("frame", frame)):
         if not 0 <= number < 2**31:
             raise InputError(f"{name}: got {number}, expected a whole number from 0 up to, but not, {2**31}")
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     activate()  # a user's module may need a variant when it is imported
-    from realtime.methods.shader.source import is_shader
-    from reports.plotting.pictures import tone_curve
+    from airlight.realtime.methods.shader.source import is_shader
+    from airlight.reports.plotting.pictures import tone_curve
 
     named = checked_configuration(method, kernel, parameters)
     chosen, apart = named
@@ -170,7 +170,7 @@ def render(
     shown = progress if isinstance(progress, bool) else None
     call: Any = operator.call
     if apart and isinstance(scene, str):
-        from reports.machine.own_process import in_own_process
+        from airlight.reports.machine.own_process import in_own_process
 
         call, progress = partial(in_own_process, name=chosen.method), shown
     if plan:
@@ -203,8 +203,8 @@ class _Asked:
 
     def read(self) -> tuple[Any, Any]:
         """Return the scene, loaded, and as methods read it."""
-        from realtime.scene.read_scene import read_scene
-        from reports.api.scenes import opened
+        from airlight.realtime.scene.read_scene import read_scene
+        from airlight.reports.api.scenes import opened
 
         loaded = opened(self.scene, self.pixels, self.changes)
         return loaded, read_scene(loaded.scene, self.precision)
@@ -234,9 +234,9 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
 
     Such code is imported in a separate process, never here.
     """
-    from realtime.methods.shader.source import is_shader
-    from reports.machine.opengl import require_opengl
-    from validation.study.configuration import Configuration, configuration
+    from airlight.realtime.methods.shader.source import is_shader
+    from airlight.reports.machine.opengl import require_opengl
+    from airlight.validation.study.configuration import Configuration, configuration
 
     if isinstance(method, Configuration):
         return configuration_of(method, kernel, parameters), method.own
@@ -245,15 +245,15 @@ def checked_configuration(method: Any, kernel: Any = None, parameters: Any = Non
     apart = (isinstance(method, str) and ":" in method) or (isinstance(kernel, str) and ":" in kernel)
     if not apart:
         return configuration_of(method, kernel, parameters), False
-    from reports.machine.own_process import in_own_process
+    from airlight.reports.machine.own_process import in_own_process
 
     return in_own_process(configuration, method, kernel_name(kernel), parameters or {}, name=method), True
 
 
 def _ready(asked: _Asked, frames: int, layers: bool, progress: Progress) -> tuple[Any, Any, Any, bool]:
     """Return a scene, loaded and read, what renders it, and whether with the further layers of the method."""
-    from realtime.methods.registry import find_method
-    from validation.study.configuration import prepared
+    from airlight.realtime.methods.registry import find_method
+    from airlight.validation.study.configuration import prepared
 
     loaded, read = asked.read()
     _check_work(loaded.name, read, asked.chosen, frames)
@@ -269,14 +269,14 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
     """Render a frame, and time it where that is asked for."""
     import drjit as dr
 
-    from realtime.frame.samples import render_samples
-    from realtime.scene.read_scene import describe
-    from reports.api.results import Rendering, sealed
-    from reports.machine.environment import activate
-    from validation.study.configuration import prepared
-    from validation.study.cost import TIMED
-    from validation.study.run import layered_frame
-    from validation.study.turns import time_alone
+    from airlight.realtime.frame.samples import render_samples
+    from airlight.realtime.scene.read_scene import describe
+    from airlight.reports.api.results import Rendering, sealed
+    from airlight.reports.machine.environment import activate
+    from airlight.validation.study.configuration import prepared
+    from airlight.validation.study.cost import TIMED
+    from airlight.validation.study.run import layered_frame
+    from airlight.validation.study.turns import time_alone
 
     variant, chosen = activate(), asked.chosen
     loaded, read, renderer, layered = _ready(asked, samples + (TIMED if timed else 0), samples == 1, progress)
@@ -314,13 +314,13 @@ def _animation(
     """Render the frames of an animation and write each as soon as it is done."""
     import numpy as np
 
-    from analytic.clock import stopwatch
-    from reports.api.results import RenderedFrames, write_image
-    from reports.machine.environment import activate
-    from reports.plotting.pictures import tone_curve
-    from validation.scenes.animation import animate, frame_changes, frame_objects, moved_parts, parse_moves
-    from validation.study.frame_times import timed_image
-    from validation.study.run import layered_frame
+    from airlight.analytic.clock import stopwatch
+    from airlight.reports.api.results import RenderedFrames, write_image
+    from airlight.reports.machine.environment import activate
+    from airlight.reports.plotting.pictures import tone_curve
+    from airlight.validation.scenes.animation import animate, frame_changes, frame_objects, moved_parts, parse_moves
+    from airlight.validation.study.frame_times import timed_image
+    from airlight.validation.study.run import layered_frame
 
     variant, chosen = activate(), asked.chosen
     moved_by = None if moves is None else parse_moves(moves)
@@ -371,8 +371,8 @@ def _write_frames(
     path: Path, scene: str, changes: list[dict[str, tuple[float, ...]] | None], objects: dict[str, Any]
 ) -> tuple[str, ...]:
     """Write NAME.json beside the frames NAME-0001.exr, which `compare --frames` reads, where changes have names."""
-    from reference.storage.files import write_text
-    from validation.motion.frames_file import FramesRecord
+    from airlight.reference.storage.files import write_text
+    from airlight.validation.motion.frames_file import FramesRecord
 
     named = [each for each in changes if each is not None]
     if len(named) < max(len(changes), 2):
@@ -391,8 +391,8 @@ def _numbered(path: Path, number: int, frames: int) -> Path:
 
 def _plan(asked: _Asked) -> "Said":
     """Return the features that a scene needs."""
-    from realtime.scene.read_scene import describe
-    from reports.tables.record import Said
+    from airlight.realtime.scene.read_scene import describe
+    from airlight.reports.tables.record import Said
 
     loaded, read = asked.read()
     words, notes = describe(read.features), read.features.notes
@@ -404,7 +404,7 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
     """Return the faults of planes in the order of a paper, and print them on the error stream."""
     import sys
 
-    from realtime.methods.shadow_planes.method import PlanePreparation
+    from airlight.realtime.methods.shadow_planes.method import PlanePreparation
 
     preparation = renderer.stages.prepare
     warnings: tuple[str, ...] = preparation.warnings if isinstance(preparation, PlanePreparation) else ()
@@ -414,8 +414,8 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
 
 
 def _check_work(name: str, scene: Any, chosen: "Configuration", frames: int) -> None:
-    from validation.study.configuration import configuration_work
-    from validation.study.cost import check_work
+    from airlight.validation.study.configuration import configuration_work
+    from airlight.validation.study.cost import check_work
 
     what = f"render {name}, {scene.camera.width} x {scene.camera.height}, {chosen.label}"
     check_work(what, [configuration_work(scene, chosen, frames)])
@@ -433,9 +433,14 @@ def asked_configurations(
     configurations; 'all', the default, for `usual`, or those of every built-in method for fog. Every method is measured
     with each kernel and with all settings, given by name or as NAME=VALUE; kernel=NAME is one more kernel.
     """
-    from realtime.methods.registry import FOG_METHODS
-    from realtime.methods.shader.source import is_users
-    from validation.study.configuration import Configuration, chosen_configurations, configuration, parse_settings
+    from airlight.realtime.methods.registry import FOG_METHODS
+    from airlight.realtime.methods.shader.source import is_users
+    from airlight.validation.study.configuration import (
+        Configuration,
+        chosen_configurations,
+        configuration,
+        parse_settings,
+    )
 
     named_kernels = several(kernels)
     if isinstance(settings, Mapping):

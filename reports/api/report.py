@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from analytic.errors import InputError, nearest
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError, nearest
+from airlight.reports.api.inputs import (
     File,
     Kernels,
     Methods,
@@ -25,13 +25,13 @@ from reports.api.inputs import (
     several,
     telling,
 )
-from reports.tables.drawing import html
-from reports.tables.record import Result, Said, block, bullets
-from reports.tables.table import Table
+from airlight.reports.tables.drawing import html
+from airlight.reports.tables.record import Result, Said, block, bullets
+from airlight.reports.tables.table import Table
 
 if TYPE_CHECKING:
-    from reports.data import records
-    from validation.engine.images import EngineImage
+    from airlight.reports.data import records
+    from airlight.validation.engine.images import EngineImage
 
 FOLDER = "airlight-report"  #: where a report is written by default
 
@@ -58,14 +58,14 @@ class Report(Result):
     @property
     def confirmed(self) -> bool:
         """Whether no check speaks against the reference, and at least one confirms each layer."""
-        from reports.report.claims import confirmed
+        from airlight.reports.report.claims import confirmed
 
         return confirmed(self.data.scenes)
 
     @property
     def faults(self) -> Sequence[str]:
         """The faults of user methods."""
-        from reports.report.claims import own_faults
+        from airlight.reports.report.claims import own_faults
 
         return own_faults(row for scene in self.data.scenes for row in scene.methods)
 
@@ -81,7 +81,7 @@ class Report(Result):
     @property
     def tables(self) -> Sequence[Table]:
         """The fastest method within an error."""
-        from reports.tables.methods import fastest_table
+        from airlight.reports.tables.methods import fastest_table
 
         return [fastest_table(self.data.scenes)] if self.data.scenes else []
 
@@ -232,16 +232,16 @@ def _python(value: Any) -> str:
 
 
 def _figures(folder: Path, column: str, scenes: list[str], labels: list[str]) -> tuple[str, ...]:
-    from reports.figures.report import write_figures
+    from airlight.reports.figures.report import write_figures
 
     return write_figures(folder, column, scene=scenes[0] if scenes else None, labels=labels or None)
 
 
 def _redrawn(path: Path, output: Any, figures: str | None, scenes: list[str], labels: list[str]) -> Report:
     """Draw the page of a report again, into its own folder or as a whole report into another, and its figures."""
-    from reference.storage.files import alone, ensure_folder, write_bytes, write_text
-    from reports.data.records import load_report, named_files
-    from reports.page.render import render_page
+    from airlight.reference.storage.files import alone, ensure_folder, write_bytes, write_text
+    from airlight.reports.data.records import load_report, named_files
+    from airlight.reports.page.render import render_page
 
     if len(scenes) > 1:
         raise InputError("report: the strip shows one scene; name one of them")
@@ -274,19 +274,19 @@ def _measured(
     """Measure and write a report; unusable input is refused before the work begins."""
     import gc
 
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     place = None
     if cluster is not None:
-        from reports.cluster.connect import connected, parse_place
+        from airlight.reports.cluster.connect import connected, parse_place
 
         place = parse_place(cluster)
     activate()
-    from realtime.methods.shader.source import is_users
-    from reports.api.render import asked_configurations
-    from reports.report.measure import write_report
-    from validation.study.cost import TIMED, check_work, frame_work, reference_work
-    from validation.study.study import RandomScenes, read_study, standard_study
+    from airlight.realtime.methods.shader.source import is_users
+    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.report.measure import write_report
+    from airlight.validation.study.cost import TIMED, check_work, frame_work, reference_work
+    from airlight.validation.study.study import RandomScenes, read_study, standard_study
 
     study, asked = standard_study(effort), [os.fspath(path) for path in scenes]
     if len(asked) == 1 and asked[0].endswith(".toml"):
@@ -297,7 +297,7 @@ def _measured(
     if methods and all(isinstance(name, str) and is_users(name) for name in methods):
         note(progress, ["what --method names is measured alone; --method all adds the built-in methods"])
     if shown:  # the sizes of an effort are known to be right; those of images are the user's
-        from validation.engine.images import images_size
+        from airlight.validation.engine.images import images_size
 
         sizes = [images_size(tuple(several)) for several in shown.values()]
         works = [reference_work(size) for size in sizes]
@@ -327,9 +327,9 @@ def _scenes_of_images(
     """
     if images is None:
         return list(asked or usual), {}
-    from validation.engine.images import find_images
-    from validation.scenes.loading import scene_stem
-    from validation.scenes.registry import SCENES
+    from airlight.validation.engine.images import find_images
+    from airlight.validation.scenes.loading import scene_stem
+    from airlight.validation.scenes.registry import SCENES
 
     shown = find_images(images, {scene_stem(name): name for name in [*SCENES, *asked]})
     names = list(asked or shown)
@@ -341,7 +341,7 @@ def _scenes_of_images(
 
 def _done(report: "records.Report") -> str:
     """Say how long it took, and how much of it had been measured before."""
-    from reports.page.filters import kept_words
+    from airlight.reports.page.filters import kept_words
 
     kept = kept_words(report)
     more = f"; {kept}; --fresh measures again" if kept else ""
@@ -372,8 +372,8 @@ def diff(
     time_tolerance
         Relative change of a time that counts as noise on a quiet machine; inf compares no times.
     """
-    from reports.data.records import read_report
-    from reports.diff.compare import compare_reports, difference_lines, difference_tables
+    from airlight.reports.data.records import read_report
+    from airlight.reports.diff.compare import compare_reports, difference_lines, difference_tables
 
     tolerance = None if time_tolerance == math.inf else time_tolerance
     reports = read_report(Path(old)), read_report(Path(new))
@@ -418,12 +418,12 @@ def paper(
     InputError
         For an unknown paper.
     """
-    from reference.storage.store import date
-    from reports.machine.environment import activate, describe_environment
-    from reports.report.others import measure_claims
-    from reports.tables.papers import count_words, paper_tables
-    from validation.columns import plain
-    from validation.papers.claims import claims, papers
+    from airlight.reference.storage.store import date
+    from airlight.reports.machine.environment import activate, describe_environment
+    from airlight.reports.report.others import measure_claims
+    from airlight.reports.tables.papers import count_words, paper_tables
+    from airlight.validation.columns import plain
+    from airlight.validation.papers.claims import claims, papers
 
     if name is not None and name not in papers():
         raise InputError(f"paper: got {name!r}, expected one of {', '.join(papers())}" + nearest(name, papers()))
@@ -433,7 +433,7 @@ def paper(
         rows = measure_claims(chosen, quick=quick, progress=tell)
     written: tuple[str, ...] = ()
     if figures is not None:
-        from reports.figures.papers import write_figures
+        from airlight.reports.figures.papers import write_figures
 
         with telling(progress, "figures") as tell:
             written = write_figures(Path(figures), name, quick=quick, progress=tell)

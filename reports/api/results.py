@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from analytic.errors import InputError
-from reference.storage.exr import TOTAL, Image
-from reference.storage.exr import layer as image_layer
-from reports.data.records import Reference as QuadratureReference
-from reports.plotting.pictures import (
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import TOTAL, Image
+from airlight.reference.storage.exr import layer as image_layer
+from airlight.reports.data.records import Reference as QuadratureReference
+from airlight.reports.plotting.pictures import (
     ToneCurve,
     exposure,
     png_bytes,
@@ -30,11 +30,11 @@ from reports.plotting.pictures import (
     tone_mapped,
     write_png,
 )
-from reports.tables.methods import rate_words
-from reports.tables.record import Result
-from validation.columns import plain
-from validation.estimates.images import MonteCarloReference
-from validation.timing import FrameTimes
+from airlight.reports.tables.methods import rate_words
+from airlight.reports.tables.record import Result
+from airlight.validation.columns import plain
+from airlight.validation.estimates.images import MonteCarloReference
+from airlight.validation.timing import FrameTimes
 
 Array = NDArray[np.floating]
 _NOTHING = "nothing written"
@@ -148,7 +148,7 @@ class LayeredImage(Pictured):
         return Path(path)
 
     def _repr_html_(self) -> str:
-        from reports.tables.record import block, bullets, picture
+        from airlight.reports.tables.record import block, bullets, picture
 
         title = self.title
         shown = [picture(self._png, self.size[0], alt=f"{title}, all light", caption="all light")]
@@ -329,8 +329,8 @@ class RenderedFrames(Result):
 
 def write_image(path: Path, image: Image, curve: ToneCurve | None = None, *, total: Array | None = None) -> None:
     """Write layers as .exr, or their total as .png through a tone curve; by default one that suits it."""
-    from reference.storage.exr import write_exr
-    from reports.machine.environment import stamped
+    from airlight.reference.storage.exr import write_exr
+    from airlight.reports.machine.environment import stamped
 
     if path.suffix.lower() == ".exr":
         write_exr(path, stamped(image))

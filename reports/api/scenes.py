@@ -8,12 +8,12 @@ from typing import Any
 
 import mitsuba as mi
 
-from analytic.errors import InputError
-from reference.storage.scene_digest import build_scene
-from reports.api.inputs import one_error, pixels_of
-from validation.scenes.bodies import check_bodies
-from validation.scenes.loading import LoadedScene, load_scene, name_shapes, resize
-from validation.scenes.numbers import check_numbers
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.scene_digest import build_scene
+from airlight.reports.api.inputs import one_error, pixels_of
+from airlight.validation.scenes.bodies import check_bodies
+from airlight.validation.scenes.loading import LoadedScene, load_scene, name_shapes, resize
+from airlight.validation.scenes.numbers import check_numbers
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,9 +31,9 @@ class OpenScene(LoadedScene):
         return dict(_described(self)[0])
 
     def _repr_html_(self) -> str:
-        from reports.page.filters import facts
-        from reports.tables.drawing import html
-        from reports.tables.record import block, paragraph
+        from airlight.reports.page.filters import facts
+        from airlight.reports.tables.drawing import html
+        from airlight.reports.tables.record import block, paragraph
 
         try:
             words, notes = _described(self)
@@ -48,7 +48,7 @@ class OpenScene(LoadedScene):
 
 def opened(scene: Any, size: Any = None, changes: Mapping[str, tuple[float, ...]] | None = None) -> OpenScene:
     """Return a scene at a size, its own by default; a scene that was loaded before is left as it is."""
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     activate()
     pixels = pixels_of(size)
@@ -107,7 +107,7 @@ def _from_mitsuba(scene: Any) -> OpenScene:
 
 @one_error
 def _described(loaded: OpenScene) -> tuple[dict[str, str], tuple[str, ...]]:
-    from realtime.scene.read_scene import describe, read_scene
+    from airlight.realtime.scene.read_scene import describe, read_scene
 
     features = read_scene(loaded.scene).features
     return describe(features), features.notes

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from reports.api.inputs import File, Progress, exclude, one_error, telling
-from reports.tables.record import Result, Said
+from airlight.reports.api.inputs import File, Progress, exclude, one_error, telling
+from airlight.reports.tables.record import Result, Said
 
 if TYPE_CHECKING:
-    from reports.cluster.connect import Place
-    from reports.cluster.run import Group, Task
-    from validation.study.keys import Made
-    from validation.study.rows import RowStore
-    from validation.study.study import Cell, Study
+    from airlight.reports.cluster.connect import Place
+    from airlight.reports.cluster.run import Group, Task
+    from airlight.validation.study.keys import Made
+    from airlight.validation.study.rows import RowStore
+    from airlight.validation.study.study import Cell, Study
 
 _USUAL = 100  # random scenes of a study without a file
 _EVERY = 300.0  # between two times that the Parquet is written while rows come [s]
@@ -108,15 +108,15 @@ def sweep(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.machine.environment import activate, require
+    from airlight.reports.machine.environment import activate, require
 
     require("pyarrow", "sweep", "a sweep")
     if from_ is not None:
         exclude("from", "computes no cells", {"the study": study, "cluster": cluster})
         return _findings(Path(from_), None if output is None else Path(output))
-    from reports.cluster.connect import parse_place
-    from validation.study.rows import RowStore
-    from validation.study.study import default_study, read_study
+    from airlight.reports.cluster.connect import parse_place
+    from airlight.validation.study.rows import RowStore
+    from airlight.validation.study.study import default_study, read_study
 
     place = parse_place(cluster)
     number = str(_USUAL if study is None else study)
@@ -133,8 +133,8 @@ def sweep(
 
 def _findings(source: Path, target: Path | None) -> Said:
     """Write what the rows of a sweep say, and return it."""
-    from reports.sweep.page import write_sweep
-    from reports.sweep.tables import errors_table, speed_table
+    from airlight.reports.sweep.page import write_sweep
+    from airlight.reports.sweep.tables import errors_table, speed_table
 
     said, page = write_sweep(source, target)
     count = f"{said.scenes} scenes, {len(said.samples)} configurations, {len(said.sweep)} cells"
@@ -149,9 +149,9 @@ def _findings(source: Path, target: Path | None) -> Said:
 
 def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any) -> SweepRun:
     """Compute what is missing, add it to the store, and return what came of it."""
-    from reports import __version__
-    from reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
-    from validation.study.keys import made_here, scene_identities
+    from airlight.reports import __version__
+    from airlight.reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
+    from airlight.validation.study.keys import made_here, scene_identities
 
     made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
     problems: list[Problem] = []
@@ -202,8 +202,8 @@ def _part(
     quick: bool,
 ) -> Counter[str]:
     """Run groups, and add the rows of each outcome; return what came of their cells."""
-    from reports.cluster.connect import connected
-    from reports.cluster.run import run_groups
+    from airlight.reports.cluster.connect import connected
+    from airlight.reports.cluster.run import run_groups
 
     counts, written = Counter[str](), time.monotonic()
     if not groups:

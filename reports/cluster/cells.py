@@ -15,20 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from realtime.scene.read_scene import Scene, read_scene
-from reports import __version__
-from reports.cluster.run import Group, Outcome, Task, is_alone
-from reports.machine.environment import processor
-from reports.plotting.pictures import error_map, exposure, tone_mapped
-from validation.properties.properties import scene_properties
-from validation.scenes.loading import LoadedScene
-from validation.study.keys import Made, cell_key, row_source
-from validation.study.reference import Reference, cell_reference, load_cell
-from validation.study.row import FRAME_MS, NO_REFERENCE, Origin, row_values
-from validation.study.rows import RowStore
-from validation.study.run import cell_row, run
-from validation.study.study import Cell, Study
-from validation.study.turns import time_cells
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reports import __version__
+from airlight.reports.cluster.run import Group, Outcome, Task, is_alone
+from airlight.reports.machine.environment import processor
+from airlight.reports.plotting.pictures import error_map, exposure, tone_mapped
+from airlight.validation.properties.properties import scene_properties
+from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.study.keys import Made, cell_key, row_source
+from airlight.validation.study.reference import Reference, cell_reference, load_cell
+from airlight.validation.study.row import FRAME_MS, NO_REFERENCE, Origin, row_values
+from airlight.validation.study.rows import RowStore
+from airlight.validation.study.run import cell_row, run
+from airlight.validation.study.study import Cell, Study
+from airlight.validation.study.turns import time_cells
 
 _DONE = ("done", "refused", "left out")  #: what is not computed again
 _QUALITY = 60  # of WebP

@@ -10,8 +10,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from reports.machine import quick_compilation
-from reports.machine.environment import require, threads
+from airlight.reports.machine import quick_compilation
+from airlight.reports.machine.environment import require, threads
 
 MEMORY = "2GiB"  #: of a local worker, above which Dask ends it
 _KEPT = 2**28  # of freed memory that a local worker keeps, and the largest array that may come of it [bytes]
@@ -28,7 +28,7 @@ Place = int | str  #: what `--cluster` names: processes of this machine, or a sc
 
 def parse_place(word: str | None) -> Place:
     """Return the place that a word names; a worker for each processor of this machine for None."""
-    from analytic.errors import InputError
+    from airlight.analytic.errors import InputError
 
     require("distributed", "sweep", "work on several processes or machines")
     word = "local" if word is None else word.strip()
@@ -58,7 +58,7 @@ def _local(workers: int, *, quick: bool = False) -> Iterator[Client]:
     import dask
     from distributed import Client, LocalCluster
 
-    from reference.storage.files import temporary_folder
+    from airlight.reference.storage.files import temporary_folder
 
     alone = workers == 1
     settings: dict[str, object] = {
@@ -124,7 +124,7 @@ def _without_interrupts() -> Iterator[None]:
 def _remote(scheduler: str) -> Iterator[Client]:
     from distributed import Client
 
-    from analytic.errors import InputError
+    from airlight.analytic.errors import InputError
 
     given = {"address" if _ADDRESS.fullmatch(scheduler) else "scheduler_file": scheduler}
     try:
@@ -155,8 +155,8 @@ def _quiet() -> None:
 
 def facts() -> Any:
     """Return the versions and source code of this process, `validation.study.keys.Made`."""
-    from reports import __version__
-    from reports.machine.environment import activate
-    from validation.study.keys import made_here
+    from airlight.reports import __version__
+    from airlight.reports.machine.environment import activate
+    from airlight.validation.study.keys import made_here
 
     return made_here(__version__, activate())

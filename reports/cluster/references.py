@@ -14,20 +14,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.clock import Spent, stopwatch
-from analytic.errors import InputError
-from reference.monte_carlo.batches import Batches
-from reference.quadrature.ray_values import ReferenceImage
-from reference.storage.store import fresh_results, fresh_since, is_kept, keep
-from reports.cluster.connect import Client, facts
-from reports.cluster.run import Group, Task, run_groups
-from validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
-from validation.estimates.quadrature import reference_inputs, reference_result
-from validation.scenes.changes import change_words
-from validation.scenes.loading import LoadedScene
-from validation.study.configuration import Configuration
-from validation.study.reference import load_cell
-from validation.study.study import Cell
+from airlight.analytic.clock import Spent, stopwatch
+from airlight.analytic.errors import InputError
+from airlight.reference.monte_carlo.batches import Batches
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.storage.store import fresh_results, fresh_since, is_kept, keep
+from airlight.reports.cluster.connect import Client, facts
+from airlight.reports.cluster.run import Group, Task, run_groups
+from airlight.validation.estimates.monte_carlo import Elsewhere, ElsewhereFor, Trace, batch_tracer
+from airlight.validation.estimates.quadrature import reference_inputs, reference_result
+from airlight.validation.scenes.changes import change_words
+from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.study.configuration import Configuration
+from airlight.validation.study.reference import load_cell
+from airlight.validation.study.study import Cell
 
 _LIMIT = 6 * 3600.0  # of a reference or a batch [s]
 _WAVE = 8  # batches that are asked for at once by worker, where their number is not known before

@@ -21,7 +21,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
-from reports.cluster.connect import Client, facts
+from airlight.reports.cluster.connect import Client, facts
 
 ALONE = "alone"  #: the Dask resource of a worker on whose host nothing else runs
 
@@ -72,7 +72,7 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
 
-    from analytic.errors import InputError
+    from airlight.analytic.errors import InputError
 
     topic = f"airlight-{uuid.uuid4().hex[:12]}"
     begun: dict[str, tuple[str, float]] = {}  # by future: which task began last, and when [s]
@@ -173,7 +173,7 @@ def _check(worker: Any, made: Any) -> None:
             raise _Refused(f"worker {worker.address} cannot do the work ({type(error).__name__}: {error})") from None
         import drjit as dr
 
-        from reports.machine.environment import LEAST_THREADS
+        from airlight.reports.machine.environment import LEAST_THREADS
 
         dr.set_thread_count(max(LEAST_THREADS, worker.state.nthreads))
     if differences := made.differences(worker.airlight_made):
@@ -181,8 +181,8 @@ def _check(worker: Any, made: Any) -> None:
 
 
 def _outcome(task: Task, *values: Any) -> Outcome:
-    from analytic.errors import InputError
-    from realtime.errors import InputError as MethodError
+    from airlight.analytic.errors import InputError
+    from airlight.realtime.errors import InputError as MethodError
 
     try:
         return Outcome(task, "done", task.function(*values, *task.arguments))

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`airlight.list`: the built-in scenes, methods, kernels, studies and papers."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from analytic.errors import InputError, nearest
-from reports.tables.drawing import text_of
-from reports.tables.record import Said
-from reports.tables.table import Table, table, words
+from airlight.analytic.errors import InputError, nearest
+from airlight.reports.tables.drawing import text_of
+from airlight.reports.tables.record import Said
+from airlight.reports.tables.table import Table, table, words
 
 _LONG = {"long": True}
 
 
-def list_(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None) -> Said:
+def list(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | None = None) -> Said:
     """List the built-in scenes, methods, kernels, studies and papers.
 
     The lists of methods and kernels name their parameters with the defaults, which `--set` changes.
@@ -33,18 +33,18 @@ def list_(what: Literal["scenes", "methods", "kernels", "studies", "papers"] | N
     return Said(name="list", data={kind: _data(each) for kind, each in tables.items()}, tables=[*tables.values()])
 
 
-def _data(shown: Table) -> list[dict[str, str]]:
+def _data(shown: Table) -> Sequence[dict[str, str]]:
     return [{key: text_of(value) for key, value in row.values.items()} for row in shown.rows]
 
 
 def _scenes() -> Table:
-    from validation.scenes.registry import SCENES
+    from airlight.validation.scenes.registry import SCENES
 
     return table("", words("name", "purpose", "published", how=_LONG), map(vars, SCENES.values()))
 
 
 def _methods() -> Table:
-    from realtime.methods.registry import METHODS
+    from airlight.realtime.methods.registry import METHODS
 
     rows = [
         (each.name, each.summary, each().uses_kernel, each.shadows, _defaults(each), each.source)
@@ -54,26 +54,26 @@ def _methods() -> Table:
 
 
 def _kernels() -> Table:
-    from realtime.kernels.registry import KERNELS
+    from airlight.realtime.kernels.registry import KERNELS
 
     rows = [(each.name, each.summary, _words(each.parameters), each.source) for each in KERNELS.values()]
     return table("", words("name", "what", "parameters", "source", how=_LONG), rows)
 
 
 def _studies() -> Table:
-    from reports.studies.registry import STUDIES, summary
+    from airlight.reports.studies.registry import STUDIES, summary
 
     return table("", words("name", "what", how=_LONG), [(name, summary(name)) for name in STUDIES])
 
 
 def _papers() -> Table:
-    from validation.papers.claims import papers
+    from airlight.validation.papers.claims import papers
 
-    return table("", words("name", "paper", how=_LONG), list(papers().items()))
+    return table("", words("name", "paper", how=_LONG), [*papers().items()])
 
 
 def _defaults(method: Any) -> str:
-    from realtime.parameters import defaults
+    from airlight.realtime.parameters import defaults
 
     return _words(defaults(method))
 

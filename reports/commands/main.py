@@ -4,7 +4,7 @@
 Cyclopts reads a function's signature and its docstring, so that the docstring is the help. This module adds the options
 of all commands: --json prints the result's data, -o writes it to files. A command returns a result
 (`reports.tables.record`), which is printed and decides the exit status. To add a command, write a public function in
-`reports/api/`, name it in `airlight.py`, and add it to its panel in `_PANELS`.
+`reports/api/`, name it in `src/airlight/__init__.pyi`, and add it to its panel in `_PANELS`.
 
 Modules of commands import nothing heavy at the top, so that `--help` answers at once.
 """
@@ -22,28 +22,28 @@ import cyclopts
 import docstring_parser
 from cyclopts import App, Group, Parameter
 
-from reports import __version__
-from reports.api.compare import compare
-from reports.api.explore import describe, view
-from reports.api.export import export
-from reports.api.inputs import Files, output_files
-from reports.api.reference import reference
-from reports.api.render import render
-from reports.api.report import diff, paper, report
-from reports.api.sweep import sweep
-from reports.commands.list import list_
-from reports.commands.test import run_tests
-from reports.machine.doctor import doctor
-from reports.machine.environment import (
+from airlight.reports import __version__
+from airlight.reports.api.compare import compare
+from airlight.reports.api.explore import describe, view
+from airlight.reports.api.export import export
+from airlight.reports.api.inputs import Files, output_files
+from airlight.reports.api.reference import reference
+from airlight.reports.api.render import render
+from airlight.reports.api.report import diff, paper, report
+from airlight.reports.api.sweep import sweep
+from airlight.reports.commands.list import list as list_
+from airlight.reports.commands.test import run_tests
+from airlight.reports.machine.doctor import doctor
+from airlight.reports.machine.environment import (
     VARIANT_VARIABLE,
     MissingError,
     install_line,
     missing_packages,
 )
-from reports.studies.registry import ENDINGS as STUDY_ENDINGS
-from reports.studies.registry import STUDIES, find_study
-from reports.studies.registry import study as run_study
-from reports.tables.record import Result, colours_wanted, print_json, terminal_width
+from airlight.reports.studies.registry import ENDINGS as STUDY_ENDINGS
+from airlight.reports.studies.registry import STUDIES, find_study
+from airlight.reports.studies.registry import study as run_study
+from airlight.reports.tables.record import Result, colours_wanted, print_json, terminal_width
 
 DONE, FAILED, WRONG_INPUT, MISSING = 0, 1, 2, 3
 
@@ -55,7 +55,7 @@ _PANELS: Mapping[str, tuple[Callable[..., Any], ...]] = {
     "Papers": (paper,),
     "Develop": (run_tests,),
 }
-_NAMES = {list_: "list", run_tests: "test", run_study: "study"}  #: where the function cannot have the name
+_NAMES = {run_tests: "test", run_study: "study"}  #: where the function cannot have the name
 _EPILOGUE = f"""Environment
 
 {VARIANT_VARIABLE}: where kernels run, cuda_ad_rgb or llvm_ad_rgb; the first that works by default.
@@ -130,7 +130,7 @@ def _command(function: Callable[..., Any], *, endings: Sequence[str] = ()) -> Ca
         files = output_files(list(options.pop("output", ())), *endings) if endings else []
         settings = options.pop("settings", ()) if "settings" not in own else ()
         if settings:
-            from validation.study.configuration import parse_settings
+            from airlight.validation.study.configuration import parse_settings
 
             options |= parse_settings(list(settings))
         if "progress" in own:
@@ -289,7 +289,7 @@ def _at_home(word: str) -> str:
 
 def _input_errors() -> tuple[type[Exception], ...]:
     """Return both classes for the user's mistakes, as far as they were imported: `analytic` imports NumPy."""
-    modules = (sys.modules.get(name) for name in ("analytic.errors", "realtime.errors"))
+    modules = (sys.modules.get(name) for name in ("airlight.analytic.errors", "airlight.realtime.errors"))
     return tuple(module.InputError for module in modules if module is not None)
 
 

@@ -3,13 +3,13 @@
 
 import sys
 
-from reports.machine.process_start import default_signals, usable_streams
+from airlight.reports.machine.process_start import default_signals, usable_streams
 
 
 def main() -> None:
     """Run the command line, and end the process with its status."""
     default_signals()
     usable_streams()
-    from reports.commands.main import run
+    from airlight.reports.commands.main import run
 
     sys.exit(run(sys.argv[1:]))

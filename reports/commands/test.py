@@ -32,8 +32,8 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
     all_
         Also the slow and the statistical tests, injected faults and baselines.
     """
-    from reports.machine import quick_compilation
-    from reports.machine.environment import MissingError, prepare
+    from airlight.reports.machine import quick_compilation
+    from airlight.reports.machine.environment import MissingError, prepare
 
     root = Path(__file__).resolve().parents[2]
     if not (root / "tests").is_dir():
@@ -56,7 +56,7 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
 
 def _workers() -> int:
     """Return how many processes share the tests: a core each, and the memory that a worker needs."""
-    from reports.machine.environment import threads
+    from airlight.reports.machine.environment import threads
 
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return max(1, min(threads(), int(memory / WORKER_MEMORY)))
@@ -64,10 +64,10 @@ def _workers() -> int:
 
 def _recorded(command: list[str], root: Path, variant: str) -> int:
     """Run all tests, write the record, and return the exit status."""
-    from analytic.clock import stopwatch
-    from reference.storage.files import temporary_folder, write_text
-    from reports.machine import quick_compilation
-    from reports.machine.environment import describe_environment, machine_in_words
+    from airlight.analytic.clock import stopwatch
+    from airlight.reference.storage.files import temporary_folder, write_text
+    from airlight.reports.machine import quick_compilation
+    from airlight.reports.machine.environment import describe_environment, machine_in_words
 
     took = stopwatch()
     with temporary_folder() as folder:

@@ -13,14 +13,14 @@ from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any, get_args, get_type_hints
 
-from analytic.errors import InputError
-from validation.columns import column, described, record_of
-from validation.kernels.records import Stability
-from validation.papers.claims import Claim as PaperClaim
-from validation.statistics.records import Agreement, MultipleScattering, Number
-from validation.study.row import Row
-from validation.study.settings import Settings, Size
-from validation.timing import Scaling
+from airlight.analytic.errors import InputError
+from airlight.validation.columns import column, described, record_of
+from airlight.validation.kernels.records import Stability
+from airlight.validation.papers.claims import Claim as PaperClaim
+from airlight.validation.statistics.records import Agreement, MultipleScattering, Number
+from airlight.validation.study.row import Row
+from airlight.validation.study.settings import Settings, Size
+from airlight.validation.timing import Scaling
 
 SCHEMA = "airlight-report/4"
 

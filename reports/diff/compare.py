@@ -10,17 +10,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from analytic.errors import InputError
-from reports.data.records import Report, Scene
-from reports.diff.times import Finding, TimeComparison, compare_times
-from reports.report.claims import confirmed
-from reports.tables.agreement import verdict
-from reports.tables.costs import TIMES, WORK, same_records
-from reports.tables.table import Table, fields_of, table, words
-from validation.metrics.errors import Metrics
-from validation.papers.claims import Claim
-from validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
-from validation.study.row import Row
+from airlight.analytic.errors import InputError
+from airlight.reports.data.records import Report, Scene
+from airlight.reports.diff.times import Finding, TimeComparison, compare_times
+from airlight.reports.report.claims import confirmed
+from airlight.reports.tables.agreement import verdict
+from airlight.reports.tables.costs import TIMES, WORK, same_records
+from airlight.reports.tables.table import Table, fields_of, table, words
+from airlight.validation.metrics.errors import Metrics
+from airlight.validation.papers.claims import Claim
+from airlight.validation.statistics.noise import FLOORS, TIME_TOLERANCE, error_band, other_power
+from airlight.validation.study.row import Row
 
 _ERRORS = ("relative_rmse", "relative_bias", "p50", "p99", "max", "nonfinite", "negative")
 #: Units of figures that depend on how busy the machine was: another verdict is a note.

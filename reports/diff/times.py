@@ -4,10 +4,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from reports.data.records import Report, Size
-from reports.tables.methods import runs_of
-from validation.statistics.noise import SHORTEST, Times, drift, growths, least_ratio, slower_stages, spread
-from validation.timing import FrameTimes
+from airlight.reports.data.records import Report, Size
+from airlight.reports.tables.methods import runs_of
+from airlight.validation.statistics.noise import SHORTEST, Times, drift, growths, least_ratio, slower_stages, spread
+from airlight.validation.timing import FrameTimes
 
 
 @dataclass(frozen=True)

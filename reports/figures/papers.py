@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from reference.storage.exr import Image, write_exr
-from reference.storage.files import ensure_folder, write_text
-from reports.machine.progress import Progress, sharing
-from reports.plotting.figure import ENDINGS, new_figure, picture_grid, save_figure
-from reports.plotting.pictures import exposure, tone_mapped
-from reports.plotting.style import COLOURS, WIDTHS
-from reports.tables.drawing import csv
-from reports.tables.table import Column, table
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.reference.storage.files import ensure_folder, write_text
+from airlight.reports.machine.progress import Progress, sharing
+from airlight.reports.plotting.figure import ENDINGS, new_figure, picture_grid, save_figure
+from airlight.reports.plotting.pictures import exposure, tone_mapped
+from airlight.reports.plotting.style import COLOURS, WIDTHS
+from airlight.reports.tables.drawing import csv
+from airlight.reports.tables.table import Column, table
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def _grid(pictures: Sequence[tuple[str, Any]], across: int = 3) -> Callable[[str
 
 def _pictures(quick: bool, progress: Progress) -> PaperFigure:
     """Return the pictures of Biri 2006 and Billeter 2010: a triptych, two lights, two tessellations."""
-    from validation.papers.pictures import tessellations, triptych, two_lights_image
+    from airlight.validation.papers.pictures import tessellations, triptych, two_lights_image
 
     size = (80, 60) if quick else (400, 300)
     lit = triptych(size)
@@ -81,7 +81,7 @@ _SHAFTS = {
 
 def _shafts(quick: bool, progress: Progress) -> PaperFigure:
     """Return Fig. 5.8 of Ali 2016 in `fence`: R1 to R4, the shared points, the reference, with errors and times."""
-    from validation.papers.soft_shafts import RENDERINGS, VARIANTS, rendered, shafts_scene, timings
+    from airlight.validation.papers.soft_shafts import RENDERINGS, VARIANTS, rendered, shafts_scene, timings
 
     size = (80, 60) if quick else (200, 152)
     progress(0.0, "the reference")
@@ -104,7 +104,7 @@ def _shafts(quick: bool, progress: Progress) -> PaperFigure:
 
 def _cloud_images(quick: bool, progress: Progress) -> PaperFigure:
     """Return Figs 11 and 12 of Bouthors 2008: clouds by collectors above the same by light paths."""
-    from validation.papers.clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
+    from airlight.validation.papers.clouds import GAP, LOBES, RESULTS, SAMPLES, SIZE, pair_of, shown
 
     size, samples = ((24, 18), 16) if quick else (SIZE, SAMPLES)
     scenes = {name: "Fig. 12" for name in RESULTS} | {GAP: "Fig. 11a", LOBES: "Fig. 11b"}
@@ -130,7 +130,7 @@ _WAYS = {
 
 def _cloud_transport(quick: bool, progress: Progress) -> PaperFigure:
     """Return Fig. 8 of Bouthors 2008: the light that leaves a point of a slab by its direction, in three ways."""
-    from validation.papers.slab import transport_curves
+    from airlight.validation.papers.slab import transport_curves
 
     curves = transport_curves()
 

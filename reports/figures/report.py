@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError, nearest
-from reference.storage.exr import layer as image_layer
-from reference.storage.exr import read_exr
-from reference.storage.files import write_text
-from reports.data.records import Method, Report, Scene, load_report
-from reports.plotting.figure import ENDINGS, has_point, new_figure, save_figure, show_picture, speed_chart
-from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
-from reports.plotting.style import COLOURS, WIDTHS
-from reports.tables.drawing import latex
-from reports.tables.methods import method_row, methods_table
-from reports.tables.table import Row, number
-from validation.study.row import Row as CellRow
+from airlight.analytic.errors import InputError, nearest
+from airlight.reference.storage.exr import layer as image_layer
+from airlight.reference.storage.exr import read_exr
+from airlight.reference.storage.files import write_text
+from airlight.reports.data.records import Method, Report, Scene, load_report
+from airlight.reports.plotting.figure import ENDINGS, has_point, new_figure, save_figure, show_picture, speed_chart
+from airlight.reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure, tone_mapped
+from airlight.reports.plotting.style import COLOURS, WIDTHS
+from airlight.reports.tables.drawing import latex
+from airlight.reports.tables.methods import method_row, methods_table
+from airlight.reports.tables.table import Row, number
+from airlight.validation.study.row import Row as CellRow
 
 _TIMES = ("frame", "light_moved", "objects_moved")
 _ERRORS = ("relative_rmse", "relative_bias", "p99")

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from analytic.phase import PhaseFunction
-from reference.scene.varying import GridMedium, HeightMedium
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import PhaseFunction
+from airlight.reference.scene.varying import GridMedium, HeightMedium
 
 Array = NDArray[np.float64]
 

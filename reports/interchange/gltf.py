@@ -31,12 +31,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.read import read_reference
-from reference.storage.files import write_bytes
-from reports import __version__
-from reports.interchange.meshes import ShapeMesh, shape_mesh
-from reports.interchange.scene import describe_scene
-from validation.scenes.loading import LoadedScene
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.files import write_bytes
+from airlight.reports import __version__
+from airlight.reports.interchange.meshes import ShapeMesh, shape_mesh
+from airlight.reports.interchange.scene import describe_scene
+from airlight.validation.scenes.loading import LoadedScene
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.scene.transforms import matrix_of
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.transforms import matrix_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -6,17 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from realtime.scene.read_scene import read_scene
-from reference.scene.area_light import ReferenceAreaLight
-from reference.scene.camera import camera_matrix
-from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
-from reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
-from validation.scenes.engine_fog import ENGINES, parameters_of
-from validation.scenes.loading import LoadedScene, scene_stem
-from validation.scenes.random.design import is_random
-from validation.scenes.random.scene import drawn_values
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.area_light import ReferenceAreaLight
+from airlight.reference.scene.camera import camera_matrix
+from airlight.reference.scene.directional_light import DirectionalLight
+from airlight.reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
+from airlight.reference.scene.varying import GridMedium, HeightMedium, VaryingMedium
+from airlight.validation.scenes.engine_fog import ENGINES, parameters_of
+from airlight.validation.scenes.loading import LoadedScene, scene_stem
+from airlight.validation.scenes.random.design import is_random
+from airlight.validation.scenes.random.scene import drawn_values
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def surface(shape: Any) -> dict[str, Any]:
     """Return the kind of an opaque shape and the light that it reflects."""
     import mitsuba as mi
 
-    from reports.interchange.meshes import triangle_count
+    from airlight.reports.interchange.meshes import triangle_count
 
     colour, textured = _reflectance(shape)
     flags = shape.bsdf().flags()
@@ -196,7 +196,7 @@ _PHASES = {
 
 
 def _bounds(bounds: Any) -> dict[str, Any]:
-    from reference.scene.convex_bounds import Sphere
+    from airlight.reference.scene.convex_bounds import Sphere
 
     if isinstance(bounds, Sphere):
         return {"kind": "sphere", "centre": _numbers(bounds.centre), "radius": _number(bounds.radius)}

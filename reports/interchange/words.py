@@ -4,7 +4,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from reports.tables.table import Column, Table, table
+from airlight.reports.tables.table import Column, Table, table
 
 _LISTED = 12  # most surfaces and values that are shown; the others are in the JSON
 

@@ -4,7 +4,7 @@
 The kernel has a separate process, because what can go wrong there ends the process: a libLLVM that aborts, a driver
 that crashes.
 
-    python -m reports.machine.doctor
+    python -m airlight.reports.machine.doctor
 
 prints Debian's names of the packages that are missing, for the launcher.
 """
@@ -15,8 +15,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analytic.clock import stopwatch
-from reports.machine.environment import (
+from airlight.analytic.clock import stopwatch
+from airlight.reports.machine.environment import (
     MissingError,
     atomic_problem,
     missing_packages,
@@ -25,12 +25,12 @@ from reports.machine.environment import (
     threads,
     versions,
 )
-from reports.machine.gpu import cuda_status, optix_status
-from reports.machine.llvm import find_llvm
-from reports.machine.opengl import opengl_status
-from reports.machine.own_process import EndedError, in_own_process
-from reports.tables.record import Result
-from reports.tables.table import Table, table, words
+from airlight.reports.machine.gpu import cuda_status, optix_status
+from airlight.reports.machine.llvm import find_llvm
+from airlight.reports.machine.opengl import opengl_status
+from airlight.reports.machine.own_process import EndedError, in_own_process
+from airlight.reports.tables.record import Result
+from airlight.reports.tables.table import Table, table, words
 
 _PATIENCE = 180.0  # seconds for the first kernel; the first one on a GPU compiles OptiX's own
 
@@ -162,8 +162,8 @@ def doctor(*, clear_cache: bool = False) -> Doctor:
 
 def _cache(*, clear: bool) -> Cache:
     """Return how much is cached, after everything is removed where that is asked for."""
-    from analytic.errors import InputError
-    from reference.storage.cache import cache_entries, cache_folder, cache_limit, clear_cache
+    from airlight.analytic.errors import InputError
+    from airlight.reference.storage.cache import cache_entries, cache_folder, cache_limit, clear_cache
 
     folder = cache_folder()
     if folder.exists() and not folder.is_dir():
@@ -232,7 +232,7 @@ def probe() -> Kernel:
     import drjit as dr
     import mitsuba as mi
 
-    from reference.scene.shadow_epsilon import measure_shadow_epsilon
+    from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 
     scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere", "radius": 0.5}})
     towards = scene.ray_intersect(mi.Ray3f(mi.Point3f([0, 3], 0, -2), mi.Vector3f(0, 0, 1)))

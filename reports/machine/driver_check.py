@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.export.text import kernel_text
-from realtime.methods.shader.client import ShaderHost
-from realtime.scene.phase import named_phase
-from reference.storage.store import Inputs, stored
-from validation.certified.files import certified_data
-from validation.kernels.case_files import read_cases
+from airlight.realtime.export.text import kernel_text
+from airlight.realtime.methods.shader.client import ShaderHost
+from airlight.realtime.scene.phase import named_phase
+from airlight.reference.storage.store import Inputs, stored
+from airlight.validation.certified.files import certified_data
+from airlight.validation.kernels.case_files import read_cases
 
 _MAIN = """
 uniform sampler2D rows;

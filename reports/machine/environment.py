@@ -15,13 +15,13 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from reports import __version__
-from reports.machine import quick_compilation
-from reports.machine.gpu import cuda_status, optix_status
-from reports.machine.llvm import LLVM_VARIABLE, OLDEST_LLVM, Llvm, find_llvm
+from airlight.reports import __version__
+from airlight.reports.machine import quick_compilation
+from airlight.reports.machine.gpu import cuda_status, optix_status
+from airlight.reports.machine.llvm import LLVM_VARIABLE, OLDEST_LLVM, Llvm, find_llvm
 
 if TYPE_CHECKING:
-    from reference.storage.exr import Image
+    from airlight.reference.storage.exr import Image
 
 #: Mitsuba variants that airlight runs in: vectorised, in colour.
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
@@ -112,7 +112,7 @@ def activate(variant: str | None = None) -> str:
         raise MissingError(f"{chosen.variant} does not start ({error}); see `airlight doctor`") from error
     import drjit as dr
 
-    from reports.machine.mitsuba_log import log_to_error_stream
+    from airlight.reports.machine.mitsuba_log import log_to_error_stream
 
     dr.set_thread_count(max(LEAST_THREADS, dr.thread_count()))
     log_to_error_stream()
@@ -132,7 +132,8 @@ def require(package: str, extra: str, what: str) -> None:
 
 def child_environment(variant: str | None = None) -> dict[str, str]:
     """Return the environment of a child process: our modules, those of PYTHONPATH, and a variant, else the current."""
-    paths = [str(Path(__file__).resolve().parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    # Not resolved: in a checkout src/airlight has links to the folders.
+    paths = [str(Path(__file__).parents[3]), *filter(None, [os.environ.get("PYTHONPATH")])]
     mitsuba = sys.modules.get("mitsuba")
     current = variant or (mitsuba.variant() if mitsuba else None)
     chosen = {VARIANT_VARIABLE: current} if current else {}
@@ -141,7 +142,7 @@ def child_environment(variant: str | None = None) -> dict[str, str]:
 
 def check_variant(variant: str) -> None:
     """Raise InputError for a variant that is not one of `VARIANTS`."""
-    from analytic.errors import InputError, nearest
+    from airlight.analytic.errors import InputError, nearest
 
     if variant not in VARIANTS:
         raise InputError(

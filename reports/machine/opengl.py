@@ -3,10 +3,10 @@
 
 from functools import cache
 
-from realtime.errors import NoDriverError
-from realtime.methods.shader.client import ShaderHost
-from reports.machine.environment import MissingError
-from reports.machine.gpu import Status
+from airlight.realtime.errors import NoDriverError
+from airlight.realtime.methods.shader.client import ShaderHost
+from airlight.reports.machine.environment import MissingError
+from airlight.reports.machine.gpu import Status
 
 _DEBIAN = "apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
 
@@ -22,8 +22,8 @@ def opengl_status(*, judged: bool = True) -> Status:
         device = f"{said['device']}, {said['version']}"
         if not judged:
             return Status(True, device)
-        from realtime.export.text import CONFORMING
-        from reports.machine.driver_check import error_of_device
+        from airlight.realtime.export.text import CONFORMING
+        from airlight.reports.machine.driver_check import error_of_device
 
         wrong = error_of_device(device, host=host)
     except NoDriverError as error:

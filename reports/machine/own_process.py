@@ -21,11 +21,11 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
-from analytic.clock import Spent
-from analytic.errors import InputError
-from realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
-from reports.machine import quick_compilation
-from reports.machine.environment import child_environment
+from airlight.analytic.clock import Spent
+from airlight.analytic.errors import InputError
+from airlight.realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
+from airlight.reports.machine import quick_compilation
+from airlight.reports.machine.environment import child_environment
 
 
 class EndedError(InputError):
@@ -69,7 +69,7 @@ def _answers(
     here, there = Pipe()
     # -P: modules of ours come before those of the user's folder.
     with subprocess.Popen(
-        [sys.executable, "-P", "-m", "reports.machine.own_process", str(os.getpid()), str(there.fileno())],
+        [sys.executable, "-P", "-m", "airlight.reports.machine.own_process", str(os.getpid()), str(there.fileno())],
         stdin=subprocess.DEVNULL,
         stdout=2,  # what the user's code prints
         env=environment,
@@ -106,7 +106,7 @@ def _answers(
 
 
 def _add_spent(spent: Any) -> None:
-    from reference.storage.store import add_spent  # loads NumPy
+    from airlight.reference.storage.store import add_spent  # loads NumPy
 
     add_spent(spent)
 
@@ -133,12 +133,12 @@ def main() -> None:
     """Do the task that the input holds, and write the answer to the output."""
     threading.Thread(target=_follow, args=(int(sys.argv[1]),), daemon=True).start()
     caller = Connection(int(sys.argv[2]))
-    from reports.machine.environment import MissingError, activate
+    from airlight.reports.machine.environment import MissingError, activate
 
     activate()
-    from realtime.errors import InputError as MethodError
-    from realtime.errors import NoDriverError
-    from reference.storage.store import counted
+    from airlight.realtime.errors import InputError as MethodError
+    from airlight.realtime.errors import NoDriverError
+    from airlight.reference.storage.store import counted
 
     # The user's module sees the command line of the command.
     sys.argv, function, arguments = caller.recv()

@@ -31,7 +31,7 @@ def _rich_bar(title: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from reports.tables.record import colours_wanted
+    from airlight.reports.tables.record import colours_wanted
 
     columns = (
         TextColumn("{task.description}"),

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from reports.data.records import Scene
-from reports.plotting.figure import has_point, legend_below, new_figure, speed_chart, speed_panel
-from reports.plotting.style import page_style, report_styles
+from airlight.reports.data.records import Scene
+from airlight.reports.plotting.figure import has_point, legend_below, new_figure, speed_chart, speed_panel
+from airlight.reports.plotting.style import page_style, report_styles
 
 _SIZE = {"markersize": 7}
 

@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from reports.data.records import Report, Scene
-from reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
-from reports.tables.costs import scaling_tables, stability_summary
-from reports.tables.drawing import DASH, html, sentence_in_html, typeset
-from reports.tables.methods import fastest_table, method_row, methods_table, published_as, times_words
-from reports.tables.papers import paper_tables
-from reports.tables.table import Column, Row, Table, table
-from reports.tables.table import number as plain_number
-from validation.study.row import Row as CellRow
+from airlight.reports.data.records import Report, Scene
+from airlight.reports.tables.agreement import agreement_table, left_out_table, trust_table, verdict
+from airlight.reports.tables.costs import scaling_tables, stability_summary
+from airlight.reports.tables.drawing import DASH, html, sentence_in_html, typeset
+from airlight.reports.tables.methods import fastest_table, method_row, methods_table, published_as, times_words
+from airlight.reports.tables.papers import paper_tables
+from airlight.reports.tables.table import Column, Row, Table, table
+from airlight.reports.tables.table import number as plain_number
+from airlight.validation.study.row import Row as CellRow
 
 #: Kinds of claims as the page names them.
 KINDS = {

@@ -38,10 +38,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from reference.storage.exr import TOTAL, read_exr
-from reports.data.records import Scene
-from validation.metrics.errors import FLOOR
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import TOTAL, read_exr
+from airlight.reports.data.records import Scene
+from airlight.validation.metrics.errors import FLOOR
 
 Codes = NDArray[np.int32]
 Array = NDArray[np.float64]

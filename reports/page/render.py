@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analytic.errors import InputError
-from reports.data.records import Method, Report, Scene
-from reports.page.chart import scene_chart, speed_error_chart
-from reports.page.filters import FILTERS, KINDS, MARKS, TABLES, kept_words, trust_words, viewer_words
-from reports.page.images import SceneImages, page_images
-from reports.plotting.pictures import signed_colours, unsigned_colours
+from airlight.analytic.errors import InputError
+from airlight.reports.data.records import Method, Report, Scene
+from airlight.reports.page.chart import scene_chart, speed_error_chart
+from airlight.reports.page.filters import FILTERS, KINDS, MARKS, TABLES, kept_words, trust_words, viewer_words
+from airlight.reports.page.images import SceneImages, page_images
+from airlight.reports.plotting.pictures import signed_colours, unsigned_colours
 
 if TYPE_CHECKING:
     import jinja2

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from reference.storage.files import write_bytes
-from reports.data.records import Scene
-from reports.plotting.style import WIDTHS, figure_style, report_styles
-from validation.study.row import Row
+from airlight.reference.storage.files import write_bytes
+from airlight.reports.data.records import Scene
+from airlight.reports.plotting.style import WIDTHS, figure_style, report_styles
+from airlight.validation.study.row import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.storage.files import write_bytes
-from validation.metrics.colour import auto_exposure
-from validation.metrics.errors import FLOOR
+from airlight.reference.storage.files import write_bytes
+from airlight.validation.metrics.colour import auto_exposure
+from airlight.validation.metrics.errors import FLOOR
 
 Colours = NDArray[np.uint8]
 

@@ -16,15 +16,15 @@ The kinds of claims:
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from realtime.methods.shader.source import is_users
-from reports.data.records import Claim, Scene
-from reports.tables.agreement import margin_words, verdict, worst_interval
-from reports.tables.costs import WORK, cliffs
-from reports.tables.methods import published_as, runs_of
-from validation.metrics.errors import known
-from validation.statistics.records import Agreement
-from validation.study.row import Row
-from validation.timing import Scaling
+from airlight.realtime.methods.shader.source import is_users
+from airlight.reports.data.records import Claim, Scene
+from airlight.reports.tables.agreement import margin_words, verdict, worst_interval
+from airlight.reports.tables.costs import WORK, cliffs
+from airlight.reports.tables.methods import published_as, runs_of
+from airlight.validation.metrics.errors import known
+from airlight.validation.statistics.records import Agreement
+from airlight.validation.study.row import Row
+from airlight.validation.timing import Scaling
 
 Scenes = Sequence[Scene]
 

@@ -17,13 +17,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analytic.clock import stopwatch
-from analytic.errors import InputError
-from realtime.errors import InputError as MethodError
-from realtime.methods.shader.source import is_shader
-from reference.storage.files import NO_SPACE, alone, ensure_folder
-from reference.storage.store import Kept, date, fresh_results
-from reports.data.records import (
+from airlight.analytic.clock import stopwatch
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as MethodError
+from airlight.realtime.methods.shader.source import is_shader
+from airlight.reference.storage.files import NO_SPACE, alone, ensure_folder
+from airlight.reference.storage.store import Kept, date, fresh_results
+from airlight.reports.data.records import (
     SCHEMA,
     Environment,
     Measured,
@@ -32,28 +32,28 @@ from reports.data.records import (
     named_files,
     report_text,
 )
-from reports.machine.environment import describe_environment, machine, threads
-from reports.machine.opengl import require_opengl
-from reports.machine.own_process import EndedError, in_own_process
-from reports.machine.progress import Progress, sharing
-from reports.page.render import render_page
-from reports.report.claims import claims, growth_claims, own_fault, unstudied
-from reports.report.others import other_parts, paper_rows
-from reports.report.scene import folder_of, write_scene
-from validation.columns import record_of
-from validation.scenes.loading import scene_stem
-from validation.scenes.registry import FOG_SCENES
-from validation.study.configuration import Configuration
-from validation.study.run import PROBE, frame_of
-from validation.study.scene import SceneStudy, open_scene, study_scene
-from validation.study.study import STUDIES, Cell, Study, standard_study
-from validation.study.turns import Apart
+from airlight.reports.machine.environment import describe_environment, machine, threads
+from airlight.reports.machine.opengl import require_opengl
+from airlight.reports.machine.own_process import EndedError, in_own_process
+from airlight.reports.machine.progress import Progress, sharing
+from airlight.reports.page.render import render_page
+from airlight.reports.report.claims import claims, growth_claims, own_fault, unstudied
+from airlight.reports.report.others import other_parts, paper_rows
+from airlight.reports.report.scene import folder_of, write_scene
+from airlight.validation.columns import record_of
+from airlight.validation.scenes.loading import scene_stem
+from airlight.validation.scenes.registry import FOG_SCENES
+from airlight.validation.study.configuration import Configuration
+from airlight.validation.study.run import PROBE, frame_of
+from airlight.validation.study.scene import SceneStudy, open_scene, study_scene
+from airlight.validation.study.study import STUDIES, Cell, Study, standard_study
+from airlight.validation.study.turns import Apart
 
 if TYPE_CHECKING:
-    from reports.cluster.connect import Client
-    from validation.engine.images import EngineImage
-    from validation.estimates.monte_carlo import ElsewhereFor
-    from validation.study.scene import Judged
+    from airlight.reports.cluster.connect import Client
+    from airlight.validation.engine.images import EngineImage
+    from airlight.validation.estimates.monte_carlo import ElsewhereFor
+    from airlight.validation.study.scene import Judged
 
 _PAGE_SECONDS = 1.0  # to pack the images of a scene and draw its part of the page
 
@@ -83,7 +83,7 @@ def write_report(
     shown = dict(images or {})
     sizes = {}
     if shown:
-        from validation.engine.images import images_size
+        from airlight.validation.engine.images import images_size
 
         sizes = {name: images_size(tuple(several)) for name, several in shown.items()}
     environment, took = describe_environment(), stopwatch()
@@ -101,7 +101,7 @@ def write_report(
             notes += each.scene.features.notes
             of_scenes.append((f"{each.name}: ", each.seconds()))
             if cluster is not None:
-                from reports.cluster.references import image_of
+                from airlight.reports.cluster.references import image_of
 
                 referenced.append(image_of(each.loaded, each.size))
         noted(notes)
@@ -114,7 +114,7 @@ def write_report(
         *steps, page = sharing(progress, [*whole, ("", _PAGE_SECONDS * len(names))])
         studied, results = [], list[Kept[Any]]()
         if cluster is not None:
-            from reports.cluster.references import bring_references
+            from airlight.reports.cluster.references import bring_references
 
             bring_references(cluster, referenced, points=study.points)
         ended = _try_own(names[0], study, process) if names else {}
@@ -183,7 +183,7 @@ def _spread(cluster: "Client | None", study: SceneStudy) -> "ElsewhereFor | None
     """Return the function that lets workers trace the batches that check the reference of a scene."""
     if cluster is None:
         return None
-    from reports.cluster.references import image_of, spread
+    from airlight.reports.cluster.references import image_of, spread
 
     return spread(cluster, image_of(study.loaded, study.study.checks.size))
 

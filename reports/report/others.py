@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from realtime.kernels.registry import KERNELS
-from realtime.methods.shader.source import is_users
-from reference.storage.code import source_digest
-from reference.storage.store import Content, Inputs, Kept, is_kept, stored
-from reports.machine.environment import machine
-from reports.machine.own_process import in_own_process
-from reports.machine.progress import Progress, counted, sharing
-from validation.kernels.records import Stability
-from validation.papers.claims import EFFORTS, Claim, claims, experiments, judged
-from validation.study.configuration import Configuration, user_code
-from validation.study.study import Study, standard_study
-from validation.timing import Scaling
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.shader.source import is_users
+from airlight.reference.storage.code import source_digest
+from airlight.reference.storage.store import Content, Inputs, Kept, is_kept, stored
+from airlight.reports.machine.environment import machine
+from airlight.reports.machine.own_process import in_own_process
+from airlight.reports.machine.progress import Progress, counted, sharing
+from airlight.validation.kernels.records import Stability
+from airlight.validation.papers.claims import EFFORTS, Claim, claims, experiments, judged
+from airlight.validation.study.configuration import Configuration, user_code
+from airlight.validation.study.study import Study, standard_study
+from airlight.validation.timing import Scaling
 
 _STABILITY, _GROWTH = 20.0, 80.0  # that these take [s]
 
@@ -69,7 +69,7 @@ class StabilityInputs(Inputs):
     """The inputs of the stability of kernels."""
 
     kind = "report-stability"
-    modules = ("validation.kernels.stability",)
+    modules = ("airlight.validation.kernels.stability",)
     rays: int
     added: Mapping[str, tuple[Content, ...]]  #: kernels of the user, with their code
 
@@ -82,7 +82,7 @@ def _stability_part(rays: int) -> OtherPart:
 
 def _stability(rays: int, added: list[str], progress: Progress) -> list[Stability]:
     """Return how stable kernels are. Nearly all of its time goes into compilation: a process compiles them quickly."""
-    from validation.kernels.stability import stability
+    from airlight.validation.kernels.stability import stability
 
     how: dict[str, Any] = {"what": "study", "name": "of the kernels", "limit": math.inf, "quick": True}
     known: list[Stability] = in_own_process(known_kernels, rays, **how)
@@ -91,7 +91,7 @@ def _stability(rays: int, added: list[str], progress: Progress) -> list[Stabilit
 
 def known_kernels(rays: int) -> list[Stability]:
     """Return how stable the kernels of airlight are, in a process that knows no others."""
-    from validation.kernels.stability import stability
+    from airlight.validation.kernels.stability import stability
 
     return stability(count=rays)
 
@@ -104,7 +104,7 @@ class ScalingInputs(Inputs):
     """The inputs of how times grow."""
 
     kind = "report-scaling"
-    modules = ("validation.study.growth",)
+    modules = ("airlight.validation.study.growth",)
     work: str  #: its kind
     study: Study
     machine: Mapping[str, str]
@@ -117,7 +117,7 @@ def _scaling_part(work: str, study: Study) -> OtherPart:
 
 def _scaling(work: str, study: Study, progress: Progress) -> list[Scaling]:
     """Return how times grow with one kind of work."""
-    from validation.study.growth import ladder, study_growth
+    from airlight.validation.study.growth import ladder, study_growth
 
     return study_growth(study, work, ladder(work, study.scenes[0], study.sizes[0]), progress=counted(progress))
 
@@ -137,7 +137,7 @@ class PaperInputs(Inputs):
     """The inputs of the figures of an experiment."""
 
     kind = "report-paper"
-    modules = ("validation.papers.claims",)
+    modules = ("airlight.validation.papers.claims",)
     name: str
     source: str  #: digest of its module, of what that imports and of the data of these
     machine: Mapping[str, str]
@@ -145,7 +145,7 @@ class PaperInputs(Inputs):
 
 def _paper(name: str) -> OtherPart:
     experiment = experiments()[name]
-    module = f"validation.papers.{experiment.function.partition(':')[0]}"
+    module = f"airlight.validation.papers.{experiment.function.partition(':')[0]}"
     inputs = PaperInputs(name, source_digest(module), machine())
     compute = partial(_experiment, name)
     return OtherPart("papers", name, experiment.seconds, inputs, compute, tuple[str, dict[str, Any]])

@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from realtime.scene.read_scene import describe
-from reference.quadrature.ray_values import ReferenceImage
-from reference.storage.exr import Image, write_exr
-from reports.data.records import Method, Reference, Scene, SceneFiles
-from reports.machine.environment import stamped
-from reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
-from validation.columns import record_of
-from validation.estimates.images import layered_reference
-from validation.estimates.quadrature import known_to
-from validation.scenes.loading import scene_stem
-from validation.study.reference import of_image
-from validation.study.scene import Judged, SceneResult
+from airlight.realtime.scene.read_scene import describe
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.reports.data.records import Method, Reference, Scene, SceneFiles
+from airlight.reports.machine.environment import stamped
+from airlight.reports.plotting.pictures import error_map, exposure, png_bytes, tone_mapped
+from airlight.validation.columns import record_of
+from airlight.validation.estimates.images import layered_reference
+from airlight.validation.estimates.quadrature import known_to
+from airlight.validation.scenes.loading import scene_stem
+from airlight.validation.study.reference import of_image
+from airlight.validation.study.scene import Judged, SceneResult
 
 #: Files of a report by what they are.
 SUFFIXES = {"exr": ".exr", "picture": ".png", "airlight": "-airlight.png", "error": "-error.png"}

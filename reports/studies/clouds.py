@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from analytic.errors import InputError
-from reports.api.inputs import Progress, Words, one_error, several, telling
-from reports.studies.registry import Study
-from reports.tables.table import Column, Table, numbers, table, words
+from airlight.analytic.errors import InputError
+from airlight.reports.api.inputs import Progress, Words, one_error, several, telling
+from airlight.reports.studies.registry import Study
+from airlight.reports.tables.table import Column, Table, numbers, table, words
 
 if TYPE_CHECKING:
     Depths: TypeAlias = Sequence[float] | str | None
@@ -88,9 +88,9 @@ def slab(
     >>> light["1"]["reflectance"] > 0
     True
     """
-    from validation.slab.light import expected_seconds, slab_numbers
-    from validation.slab.request import slab_request
-    from validation.study.cost import Work, check_work
+    from airlight.validation.slab.light import expected_seconds, slab_numbers
+    from airlight.validation.slab.request import slab_request
+    from airlight.validation.study.cost import Work, check_work
 
     if photons != int(photons) or photons == 1 or photons < 0:
         raise InputError(f"photons: got {photons}, expected a whole number from 2 on, for example 1000000")
@@ -152,8 +152,8 @@ def _draw_slab(found: Mapping[str, Any], column: str) -> Any:
     """Return the light that leaves a slab by order, and its distance from the entry, computed and by photons."""
     import numpy as np
 
-    from reports.plotting.figure import new_figure
-    from reports.plotting.style import COLOURS, WIDTHS, reference_style
+    from airlight.reports.plotting.figure import new_figure
+    from airlight.reports.plotting.style import COLOURS, WIDTHS, reference_style
 
     rows, walked = found["orders"], found["photons"]
     width, double = WIDTHS[column], column == "double"

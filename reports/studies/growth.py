@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from analytic.errors import InputError
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError
+from airlight.reports.api.inputs import (
     Methods,
     Progress,
     Scenes,
@@ -19,9 +19,9 @@ from reports.api.inputs import (
     telling,
     with_kernels,
 )
-from reports.machine.progress import counted, part_of
-from reports.studies.registry import Study, with_environment
-from validation.timing import Scaling, StepCost
+from airlight.reports.machine.progress import counted, part_of
+from airlight.reports.studies.registry import Study, with_environment
+from airlight.validation.timing import Scaling, StepCost
 
 
 @with_kernels
@@ -51,10 +51,10 @@ def scaling(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.api.render import asked_configurations
-    from reports.tables.costs import cliffs, scaling_tables
-    from validation.study.growth import ladder, study_growth
-    from validation.study.study import GROWTH, standard_study
+    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.tables.costs import cliffs, scaling_tables
+    from airlight.validation.study.growth import ladder, study_growth
+    from airlight.validation.study.study import GROWTH, standard_study
 
     usual = standard_study("scaling")
     wanted = usual.growth if kinds is None else listed("kinds", kinds)
@@ -83,9 +83,9 @@ def scaling(
 
 def _draw_scaling(records: list[Scaling], column: str) -> Any:
     """Return the time of a frame over its work, by kind of work, with the fitted exponents and the camera rays."""
-    from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS, report_styles
-    from reports.tables.costs import WORK
+    from airlight.reports.plotting.figure import new_figure
+    from airlight.reports.plotting.style import WIDTHS, report_styles
+    from airlight.reports.tables.costs import WORK
 
     kinds = list(dict.fromkeys(record.kind for record in records))
     width, double = WIDTHS[column], column == "double"

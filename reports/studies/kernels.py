@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from analytic.errors import InputError
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError
+from airlight.reports.api.inputs import (
     File,
     KernelLike,
     Kernels,
@@ -20,17 +20,17 @@ from reports.api.inputs import (
     telling,
     with_kernels,
 )
-from reports.machine.progress import counted
-from reports.studies.registry import Study, with_environment
-from reports.tables.costs import kernel_tables, stability_summary
-from reports.tables.table import Column, table
+from airlight.reports.machine.progress import counted
+from airlight.reports.studies.registry import Study, with_environment
+from airlight.reports.tables.costs import kernel_tables, stability_summary
+from airlight.reports.tables.table import Column, table
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from validation.kernels.case_files import Cases
-    from validation.kernels.records import KernelCost, Stability
+    from airlight.validation.kernels.case_files import Cases
+    from airlight.validation.kernels.records import KernelCost, Stability
 
     CasesLike: TypeAlias = Mapping[str, Any] | Cases | File
 else:
@@ -58,8 +58,8 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from analytic.phase import phase_from_words
-    from validation.kernels.benchmark import PHASES, bench_kernels, speed_against_error
+    from airlight.analytic.phase import phase_from_words
+    from airlight.validation.kernels.benchmark import PHASES, bench_kernels, speed_against_error
 
     phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
     named = [kernel_name(each) or "" for each in several(kernel)] or None
@@ -77,8 +77,8 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
 
 def _draw_costs(costs: "Sequence[KernelCost]", column: str) -> Any:
     """Return nanoseconds a ray against the error."""
-    from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS, kernel_styles
+    from airlight.reports.plotting.figure import new_figure
+    from airlight.reports.plotting.style import WIDTHS, kernel_styles
 
     width, double = WIDTHS[column], column == "double"
     figure = new_figure(width, 0.42 * width if double else 1.9 * width)
@@ -123,8 +123,8 @@ def stability(*, kernel: Kernels = (), progress: Progress = None) -> Study:
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from validation.kernels.stability import BAR, CERTIFIED
-    from validation.kernels.stability import stability as run
+    from airlight.validation.kernels.stability import BAR, CERTIFIED
+    from airlight.validation.kernels.stability import stability as run
 
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "stability") as tell:
@@ -197,7 +197,7 @@ class Integrals(Study):
         """Write the rows with a column `result` (.csv), or what `Study.save` writes; return the path."""
         if Path(path).suffix != ".csv":
             return super().save(path, column)
-        from validation.kernels.cases import write_results
+        from airlight.validation.kernels.cases import write_results
 
         write_results(self.cases, self.J.reshape(-1), Path(path))
         return Path(path)
@@ -249,12 +249,12 @@ def integrals(
     >>> bool(abs(found.error).max() < 1e-5)
     True
     """
-    from reports.machine.environment import activate
-    from validation.kernels.case_files import integrate_cases as certified
+    from airlight.reports.machine.environment import activate
+    from airlight.validation.kernels.case_files import integrate_cases as certified
 
     read, shape = _cases(cases)
     activate()
-    from validation.kernels.cases import check_results, integrate_cases, summary
+    from airlight.validation.kernels.cases import check_results, integrate_cases, summary
 
     named = kernel_name(kernel) or "exact"
     J = integrate_cases(read, named, precision)
@@ -279,7 +279,7 @@ def integrals(
 
 
 def _cases(cases: Any) -> "tuple[Cases, tuple[int, ...]]":
-    from validation.kernels.case_files import Cases, cases_from_columns, read_cases
+    from airlight.validation.kernels.case_files import Cases, cases_from_columns, read_cases
 
     if isinstance(cases, str | os.PathLike):
         cases = read_cases(Path(cases))

@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
-from analytic.errors import InputError
-from reports.api.inputs import (
+from airlight.analytic.errors import InputError
+from airlight.reports.api.inputs import (
     Kernels,
     Methods,
     Progress,
@@ -19,21 +19,21 @@ from reports.api.inputs import (
     telling,
     with_kernels,
 )
-from reports.machine.progress import part_of
-from reports.studies.registry import FRACTION, Study, with_environment
-from reports.tables.table import Row, Table, table, table_of, words
-from validation.columns import shown_values
+from airlight.reports.machine.progress import part_of
+from airlight.reports.studies.registry import FRACTION, Study, with_environment
+from airlight.reports.tables.table import Row, Table, table, table_of, words
+from airlight.validation.columns import shown_values
 
 if TYPE_CHECKING:
-    from validation.study.causes import ErrorPart
-    from validation.study.configuration import Configuration
-    from validation.study.row import Row as CellRow
+    from airlight.validation.study.causes import ErrorPart
+    from airlight.validation.study.configuration import Configuration
+    from airlight.validation.study.row import Row as CellRow
 
 
 def loaded_scenes(scenes: Any, size: Any) -> list[Any]:
     """Return the scenes, loaded; those for fog by default. Unusable scenes are refused before the work."""
-    from reports.api.scenes import opened
-    from validation.scenes.registry import FOG_SCENES
+    from airlight.reports.api.scenes import opened
+    from airlight.validation.scenes.registry import FOG_SCENES
 
     return [opened(each, size) for each in several(scenes) or FOG_SCENES]
 
@@ -52,12 +52,12 @@ def cells_of(loaded: Any, measure: Any, *, apart: bool) -> tuple[Any, Any, Calla
 
     Methods of users run in separate processes if they can be found there, `apart`.
     """
-    from realtime.scene.read_scene import read_scene
-    from reports.machine.own_process import in_own_process
-    from validation.estimates.quadrature import reference_result
-    from validation.study.reference import of_image
-    from validation.study.run import run
-    from validation.study.study import Cell
+    from airlight.realtime.scene.read_scene import read_scene
+    from airlight.reports.machine.own_process import in_own_process
+    from airlight.validation.estimates.quadrature import reference_result
+    from airlight.validation.study.reference import of_image
+    from airlight.validation.study.run import run
+    from airlight.validation.study.study import Cell
 
     scene, kept = read_scene(loaded.scene), reference_result(loaded.scene)
     reference = of_image(kept.value, kept.spent)
@@ -73,9 +73,9 @@ def check_study(
     what: str, loaded: list[Any], chosen: list[Any], *, frames: float | None = None, progress: Any = None
 ) -> None:
     """Refuse what would take more than an hour; `frames` are those of a configuration, as many as timing takes."""
-    from realtime.scene.read_scene import read_scene
-    from validation.study.configuration import configuration_work
-    from validation.study.cost import TIMED, check_work, reference_work
+    from airlight.realtime.scene.read_scene import read_scene
+    from airlight.validation.study.configuration import configuration_work
+    from airlight.validation.study.cost import TIMED, check_work, reference_work
 
     works = []
     for each in loaded:
@@ -103,7 +103,7 @@ class MethodsStudy(Study):
         scene
             Its name; all scenes by default.
         """
-        from reports.tables.methods import fastest_within
+        from airlight.reports.tables.methods import fastest_within
 
         found = fastest_within(error, [row for row in self.rows if scene in (None, row.scene)])
         return found and found[0]
@@ -152,14 +152,14 @@ def methods(
     >>> found.fastest(1e-3).error.relative_rmse < 1e-3
     True
     """
-    from reports.api.render import asked_configurations
-    from reports.machine.own_process import in_own_process
-    from reports.report.claims import own_faults
-    from reports.tables.methods import methods_table, times_words
-    from validation.study.run import with_times
-    from validation.study.scene import configurations_for
-    from validation.study.study import Cell, Measure
-    from validation.study.turns import time_cells
+    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.machine.own_process import in_own_process
+    from airlight.reports.report.claims import own_faults
+    from airlight.reports.tables.methods import methods_table, times_words
+    from airlight.validation.study.run import with_times
+    from airlight.validation.study.scene import configurations_for
+    from airlight.validation.study.study import Cell, Measure
+    from airlight.validation.study.turns import time_cells
 
     chosen, apart = asked_configurations(method, kernel, settings)
     loaded = loaded_scenes(scenes, size)
@@ -233,8 +233,8 @@ def decomposition(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.api.render import asked_configurations
-    from validation.study.study import standard_study
+    from airlight.reports.api.render import asked_configurations
+    from airlight.validation.study.study import standard_study
 
     usual = standard_study("decomposition")
     chosen, apart = asked_configurations(method, (), settings, usual=usual.configurations)
@@ -272,8 +272,8 @@ Split = list[tuple["Configuration", Any, "list[ErrorPart] | str"]]
 
 def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progress: Any) -> Split:
     """Return the errors of a scene by cause."""
-    from validation.study.causes import decompose
-    from validation.study.scene import configurations_for
+    from airlight.validation.study.causes import decompose
+    from airlight.validation.study.scene import configurations_for
 
     scene, reference, cell = cells_of(loaded, measure, apart=apart)
 
@@ -296,7 +296,7 @@ def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progres
 
 
 def _cause_table(title: str, split: Split) -> Table:
-    from validation.study.causes import ErrorPart
+    from airlight.validation.study.causes import ErrorPart
 
     rows: list[Row] = []
     for each, _, found in split:
@@ -312,9 +312,9 @@ def _draw_parts(split: list[Any], column: str) -> Any:
     """Return the image of each method, its error, and the parts that add up to it, on the scale of the page."""
     import numpy as np
 
-    from reports.plotting.figure import new_figure, show_picture
-    from reports.plotting.pictures import error_map, exposure, tone_mapped
-    from reports.plotting.style import WIDTHS
+    from airlight.reports.plotting.figure import new_figure, show_picture
+    from airlight.reports.plotting.pictures import error_map, exposure, tone_mapped
+    from airlight.reports.plotting.style import WIDTHS
 
     across = 2 + max(len(parts) for _, _, parts in split)
     wide, size = WIDTHS[column], 6 if column == "double" else 4.5

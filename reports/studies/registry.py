@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analytic.errors import InputError, nearest
-from reports.tables.record import Said
+from airlight.analytic.errors import InputError, nearest
+from airlight.reports.tables.record import Said
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +47,7 @@ class Study(Said):
 
         The name of a value in a record within a row is its path, `times.frame.median_ms`.
         """
-        from validation.columns import shown_values
+        from airlight.validation.columns import shown_values
 
         rows = [row if isinstance(row, Mapping) else shown_values(row) for row in self.rows]
         names = dict.fromkeys(name for row in rows for name in row)
@@ -68,14 +68,14 @@ class Study(Said):
         InputError
             For another ending, and a study without a figure.
         """
-        from reference.storage.files import write_text
-        from reports.tables.drawing import csv, latex, markdown
+        from airlight.reference.storage.files import write_text
+        from airlight.reports.tables.drawing import csv, latex, markdown
 
         target = Path(path)
         if target.suffix in (".pdf", ".png"):
             if self.draw is None:
                 raise InputError(f"{target}: the study {self.name} has no figure; write .csv, .tex, .md or .json")
-            from reports.plotting.figure import save_figure
+            from airlight.reports.plotting.figure import save_figure
 
             return save_figure(target, self.draw, column)
         if target.suffix == ".csv":
@@ -92,8 +92,8 @@ class Study(Said):
 
 
 def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
-    from reports.tables.drawing import csv
-    from reports.tables.table import Column, table
+    from airlight.reports.tables.drawing import csv
+    from airlight.reports.tables.table import Column, table
 
     filled = {name: values for name, values in columns.items() if any(value is not None for value in values)}
     return csv(table("", [Column(name, name) for name in filled], list(zip(*filled.values()))))
@@ -101,8 +101,8 @@ def _columns_csv(columns: Mapping[str, Sequence[Any]]) -> str:
 
 def with_environment(**data: Any) -> dict[str, Any]:
     """Return data with the machine and the versions that made them."""
-    from reports.machine.environment import describe_environment
-    from validation.columns import plain
+    from airlight.reports.machine.environment import describe_environment
+    from airlight.validation.columns import plain
 
     return {"environment": describe_environment(), **plain(data)}
 
@@ -132,7 +132,7 @@ def find_study(name: str) -> Callable[..., Any]:
     if name not in STUDIES:
         raise InputError(f"study: got {name!r}, expected one of {', '.join(STUDIES)}" + nearest(name, STUDIES))
     function: Callable[..., Any] = getattr(
-        importlib.import_module(f"reports.studies.{STUDIES[name]}"), name.replace("-", "_")
+        importlib.import_module(f"airlight.reports.studies.{STUDIES[name]}"), name.replace("-", "_")
     )
     return function
 

@@ -5,13 +5,23 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from reports.api.inputs import Kernels, Methods, Progress, SceneLike, Size, Values, pixels_of, telling, with_kernels
-from reports.machine.progress import counted
-from reports.studies.registry import FRACTION, Study, with_environment
-from reports.tables.table import Interval, numbers, table, words
+from airlight.reports.api.inputs import (
+    Kernels,
+    Methods,
+    Progress,
+    SceneLike,
+    Size,
+    Values,
+    pixels_of,
+    telling,
+    with_kernels,
+)
+from airlight.reports.machine.progress import counted
+from airlight.reports.studies.registry import FRACTION, Study, with_environment
+from airlight.reports.tables.table import Interval, numbers, table, words
 
 if TYPE_CHECKING:
-    from validation.study.variation import MethodMotion, MethodNoise
+    from airlight.validation.study.variation import MethodMotion, MethodNoise
 
 
 _GOAL = 0.01  # error, until which the time is given
@@ -52,11 +62,11 @@ def noise(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.api.render import asked_configurations
-    from reports.api.scenes import opened
-    from validation.motion.noise import BLURS, time_words
-    from validation.study.configuration import named_configurations
-    from validation.study.variation import method_noise
+    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.scenes import opened
+    from airlight.validation.motion.noise import BLURS, time_words
+    from airlight.validation.study.configuration import named_configurations
+    from airlight.validation.study.variation import method_noise
 
     chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("noise"))
     loaded = opened(scene, pixels_of(size))
@@ -100,9 +110,9 @@ def noise(
 
 def _draw_noise(found: "list[MethodNoise]", column: str) -> Any:
     """Return error against time, error spectra, and of each noisy method what is biased and how noisy it is."""
-    from reports.plotting.figure import new_figure
-    from reports.plotting.pictures import error_map
-    from reports.plotting.style import WIDTHS
+    from airlight.reports.plotting.figure import new_figure
+    from airlight.reports.plotting.pictures import error_map
+    from airlight.reports.plotting.style import WIDTHS
 
     width, noisy = WIDTHS[column], [each for each in found if each.noise.runs > 1]
     figure = new_figure(width, (0.42 + 0.38 * len(noisy)) * width)
@@ -172,10 +182,10 @@ def motion(
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from reports.api.render import asked_configurations
-    from reports.api.scenes import opened
-    from validation.study.configuration import named_configurations
-    from validation.study.variation import method_motion
+    from airlight.reports.api.render import asked_configurations
+    from airlight.reports.api.scenes import opened
+    from airlight.validation.study.configuration import named_configurations
+    from airlight.validation.study.variation import method_motion
 
     chosen, _ = asked_configurations(method, kernel, settings, usual=named_configurations("motion"))
     loaded = opened(scene, pixels_of(size))
@@ -218,8 +228,8 @@ def motion(
 
 def _draw_motion(found: "list[MethodMotion]", column: str) -> Any:
     """Return the error by frame of each method."""
-    from reports.plotting.figure import new_figure
-    from reports.plotting.style import WIDTHS
+    from airlight.reports.plotting.figure import new_figure
+    from airlight.reports.plotting.style import WIDTHS
 
     width = WIDTHS[column]
     figure = new_figure(width, 0.62 * width)

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reports.sweep.samples import FAULTS, UNTOLD, Sample, Sweep
-from validation.properties.properties import PROPERTIES
-from validation.statistics.samples import LEVEL, binomial_interval, rank_correlation
+from airlight.reports.sweep.samples import FAULTS, UNTOLD, Sample, Sweep
+from airlight.validation.properties.properties import PROPERTIES
+from airlight.validation.statistics.samples import LEVEL, binomial_interval, rank_correlation
 
 TARGETS = (0.1, 0.01, 0.001)  #: relative RMSE of claims, as fractions
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.sweep.samples import FAULTS, Sample, Sweep
-from validation.columns import column
-from validation.study.row import PROPERTY
+from airlight.reports.sweep.samples import FAULTS, Sample, Sweep
+from airlight.validation.columns import column
+from airlight.validation.study.row import PROPERTY
 
 COUNT = 10  #: worst scenes of a configuration
 

@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference.storage.files import ensure_folder, write_bytes, write_text
-from reports import __version__
-from reports.page.chart import svg_text
-from reports.page.filters import drawn, facts, percent, unbroken
-from reports.page.render import page_environment, template_text
-from reports.plotting.figure import file_bytes, legend_below, new_figure, plain_times, short
-from reports.plotting.style import page_style, report_styles
-from reports.sweep import tables
-from reports.sweep.claims import LEAST, NAMED, SAME, TARGETS, property_words
-from reports.sweep.samples import Numbers, Sample, read_sweep
-from reports.sweep.summary import Summary, sound_words, summary_of
-from validation.columns import plain
+from airlight.reference.storage.files import ensure_folder, write_bytes, write_text
+from airlight.reports import __version__
+from airlight.reports.page.chart import svg_text
+from airlight.reports.page.filters import drawn, facts, percent, unbroken
+from airlight.reports.page.render import page_environment, template_text
+from airlight.reports.plotting.figure import file_bytes, legend_below, new_figure, plain_times, short
+from airlight.reports.plotting.style import page_style, report_styles
+from airlight.reports.sweep import tables
+from airlight.reports.sweep.claims import LEAST, NAMED, SAME, TARGETS, property_words
+from airlight.reports.sweep.samples import Numbers, Sample, read_sweep
+from airlight.reports.sweep.summary import Summary, sound_words, summary_of
+from airlight.validation.columns import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

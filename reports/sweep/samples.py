@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from validation.columns import plain
-from validation.statistics.samples import quantile_interval
-from validation.study.row import COLUMNS, FRAME_MS, NO_REFERENCE, PROPERTY, STATUSES
+from airlight.analytic.errors import InputError
+from airlight.validation.columns import plain
+from airlight.validation.statistics.samples import quantile_interval
+from airlight.validation.study.row import COLUMNS, FRAME_MS, NO_REFERENCE, PROPERTY, STATUSES
 
 FILE = "sweep.parquet"  #: in the folder of a sweep
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reports.data.records import Claim as Headline
-from reports.sweep.claims import (
+from airlight.reports.data.records import Claim as Headline
+from airlight.reports.sweep.claims import (
     TARGETS,
     Claim,
     Correlation,
@@ -20,9 +20,9 @@ from reports.sweep.claims import (
     strongest,
     written,
 )
-from reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
-from reports.sweep.samples import FAULTS, Fastest, Sample, Sweep, drawn_at_random, fastest_within, samples
-from validation.statistics.samples import LEVEL, binomial_interval
+from airlight.reports.sweep.faults import Check, Fault, Reason, Worst, checks, faults, reasons, worst
+from airlight.reports.sweep.samples import FAULTS, Fastest, Sample, Sweep, drawn_at_random, fastest_within, samples
+from airlight.validation.statistics.samples import LEVEL, binomial_interval
 
 SCHEMA = "airlight-sweep/1"
 

@@ -3,11 +3,11 @@
 
 import numpy as np
 
-from reports.sweep.claims import TARGETS, property_words, written
-from reports.sweep.faults import Check, Fault
-from reports.sweep.samples import FAULTS, UNTOLD
-from reports.sweep.summary import Summary
-from reports.tables.table import Column, Measured, Name, Table, numbers, table, table_of, words
+from airlight.reports.sweep.claims import TARGETS, property_words, written
+from airlight.reports.sweep.faults import Check, Fault
+from airlight.reports.sweep.samples import FAULTS, UNTOLD
+from airlight.reports.sweep.summary import Summary
+from airlight.reports.tables.table import Column, Measured, Name, Table, numbers, table, table_of, words
 
 _FRACTION = {"digits": 2, "fraction": True}
 

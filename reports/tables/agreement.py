@@ -3,9 +3,21 @@
 
 from collections.abc import Iterable, Sequence
 
-from reports.data.records import Scene
-from reports.tables.table import Column, Interval, Name, Row, Table, Value, Verdict, fields_of, numbers, table, words
-from validation.statistics.records import Agreement, Statistics
+from airlight.reports.data.records import Scene
+from airlight.reports.tables.table import (
+    Column,
+    Interval,
+    Name,
+    Row,
+    Table,
+    Value,
+    Verdict,
+    fields_of,
+    numbers,
+    table,
+    words,
+)
+from airlight.validation.statistics.records import Agreement, Statistics
 
 _PERCENT = {"percent": True, "sign": True}
 #: Columns of what estimators say of the reference.

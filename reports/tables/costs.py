@@ -4,9 +4,9 @@
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from reports.tables.table import Column, Measured, Name, Row, Table, Value, measured, numbers, table, words
-from validation.kernels.records import ErrorLevel, KernelCost, Rays, RayTime, Stability
-from validation.timing import Scaling
+from airlight.reports.tables.table import Column, Measured, Name, Row, Table, Value, measured, numbers, table, words
+from airlight.validation.kernels.records import ErrorLevel, KernelCost, Rays, RayTime, Stability
+from airlight.validation.timing import Scaling
 
 COSTS = (
     *words("kernel"),

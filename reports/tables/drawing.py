@@ -19,7 +19,18 @@ from html import escape
 from textwrap import wrap
 from typing import Literal
 
-from reports.tables.table import Column, Interval, Measured, Name, Row, Table, Value, Verdict, digits_of, with_spread
+from airlight.reports.tables.table import (
+    Column,
+    Interval,
+    Measured,
+    Name,
+    Row,
+    Table,
+    Value,
+    Verdict,
+    digits_of,
+    with_spread,
+)
 
 #: What LaTeX needs before the document begins.
 PREAMBLE = r"\usepackage{booktabs,siunitx}"

@@ -5,9 +5,9 @@ import json
 from collections.abc import Iterable
 from dataclasses import fields
 
-from realtime.methods.shader.source import is_shader
-from reports.data.records import Scene
-from reports.tables.table import (
+from airlight.realtime.methods.shader.source import is_shader
+from airlight.reports.data.records import Scene
+from airlight.reports.tables.table import (
     Column,
     Name,
     Row,
@@ -21,9 +21,9 @@ from reports.tables.table import (
     table,
     words,
 )
-from validation.metrics.errors import Metrics
-from validation.study.row import Row as CellRow
-from validation.timing import FrameTimes, Timing, TimingRun
+from airlight.validation.metrics.errors import Metrics
+from airlight.validation.study.row import Row as CellRow
+from airlight.validation.timing import FrameTimes, Timing, TimingRun
 
 #: Times of a frame, by their names in report.json.
 TIMES = tuple(each.name for each in fields(FrameTimes) if each.name != "run")

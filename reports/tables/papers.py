@@ -8,8 +8,8 @@ import itertools
 from collections import Counter
 from collections.abc import Sequence
 
-from reports.tables.table import Interval, Table, Value, numbers, table, words
-from validation.papers.claims import VERDICTS, Claim, papers
+from airlight.reports.tables.table import Interval, Table, Value, numbers, table, words
+from airlight.validation.papers.claims import VERDICTS, Claim, papers
 
 _COLUMNS = (
     *words(item="item"),

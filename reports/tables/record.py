@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
-from reports.tables.drawing import html, sentence_in_html, sentence_in_text, text
-from reports.tables.table import Table
+from airlight.reports.tables.drawing import html, sentence_in_html, sentence_in_text, text
+from airlight.reports.tables.table import Table
 
 
 def colours_wanted() -> bool:
@@ -36,7 +36,7 @@ def print_json(data: Any) -> None:
     try:
         text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     except ValueError:
-        from analytic.errors import InputError
+        from airlight.analytic.errors import InputError
 
         raise InputError("a result is not finite, and is not printed; a number of the input may be too large") from None
     try:
@@ -90,7 +90,7 @@ class Result:
 
     def to_dict(self) -> Any:
         """Return its data, as JSON has them: the fields of the record by default."""
-        from validation.columns import plain
+        from airlight.validation.columns import plain
 
         return plain(self)
 
@@ -133,7 +133,7 @@ class Said(Result):
 
     def to_dict(self) -> Any:
         """Return the data."""
-        from validation.columns import plain
+        from airlight.validation.columns import plain
 
         return plain(self.of if self.data is None else self.data)
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # making its classes would take a tenth of the time of `airlight --help`
-    from validation.timing import Timing
+    from airlight.validation.timing import Timing
 
 
 _UNITS = ("ms", "MiB")  # that stand in a heading
@@ -157,7 +157,7 @@ def fields_of(record: type, *keys: str, **how: Any) -> tuple[Column, ...]:
 
     Their headings, units and meanings stand at the fields.
     """
-    from validation.columns import described
+    from airlight.validation.columns import described
 
     known = described(record)
     shown = [known[key] for key in keys] or [each for each in known.values() if each.kind]

@@ -14,19 +14,19 @@ from typing import Any
 
 import drjit as dr
 
-from analytic.clock import stopwatch
-from analytic.errors import InputError
-from realtime.errors import InputError as MethodError
-from realtime.frame.incremental import FrameCache, next_frame
-from realtime.frame.renderer import Frame, FrameRenderer, Stages, image_frame
-from realtime.methods.registry import find_method
-from realtime.methods.shader.method import Shader
-from realtime.parameters import defaults
-from realtime.scene.read_scene import read_again, read_scene
-from validation.clock import timed
-from validation.scenes.changes import Values, change_scene, changeable, isotropic_media
-from validation.scenes.loading import load_scene
-from validation.study.configuration import Configuration, configuration, prepared
+from airlight.analytic.clock import stopwatch
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as MethodError
+from airlight.realtime.frame.incremental import FrameCache, next_frame
+from airlight.realtime.frame.renderer import Frame, FrameRenderer, Stages, image_frame
+from airlight.realtime.methods.registry import find_method
+from airlight.realtime.methods.shader.method import Shader
+from airlight.realtime.parameters import defaults
+from airlight.realtime.scene.read_scene import read_again, read_scene
+from airlight.validation.clock import timed
+from airlight.validation.scenes.changes import Values, change_scene, changeable, isotropic_media
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import Configuration, configuration, prepared
 
 #: The `Stages` of a frame, in their order, and what the page calls them.
 WORDS = {

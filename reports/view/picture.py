@@ -9,8 +9,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.numerics.recorded import Frozen
-from reports.plotting.pictures import NOT_FINITE, tone_mapped
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.reports.plotting.pictures import NOT_FINITE, tone_mapped
 
 LAYERS = {"total": (1.0, 1.0), "airlight": (1.0, 0.0), "surface": (0.0, 1.0)}  #: weights of airlight and surface
 _BRIGHTEST = 8.0  # times white: the table ends here

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.clock import stopwatch
-from validation.metrics.errors import error_metrics
-from validation.scenes.changes import Values
+from airlight.analytic.clock import stopwatch
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.scenes.changes import Values
 
 Array = NDArray[np.float64]
 STEPS = (16, 8, 4, 2, 1)
@@ -154,8 +154,8 @@ def yield_processor() -> None:
 
 def answers(task: Task) -> Iterator[Answer]:
     """Yield the reference of an image, rays after rays."""
-    from validation.estimates.quadrature import reference_error, reference_of_pixels
-    from validation.scenes.loading import load_scene
+    from airlight.validation.estimates.quadrature import reference_error, reference_of_pixels
+    from airlight.validation.scenes.loading import load_scene
 
     scene = load_scene(task.scene, task.size, task.changes).scene
     order = pixel_order(*task.size)
@@ -180,9 +180,9 @@ def answers(task: Task) -> Iterator[Answer]:
 
 def compute(pipe: Connection, variant: str) -> None:
     """Answer the tasks of a pipe, the newest first and alone; None for nothing to do."""
-    from analytic.errors import InputError
-    from reports.machine.environment import activate
-    from reports.machine.process_start import default_signals
+    from airlight.analytic.errors import InputError
+    from airlight.reports.machine.environment import activate
+    from airlight.reports.machine.process_start import default_signals
 
     default_signals()
     with suppress(OSError, AttributeError):

@@ -18,27 +18,27 @@ from typing import Any
 
 import numpy as np
 
-from analytic.clock import stopwatch
-from analytic.errors import InputError, nearest
-from realtime.errors import InputError as MethodError
-from realtime.methods.interface.method import method_parameters
-from realtime.methods.registry import METHODS, find_method
-from realtime.parameters import defaults, values
-from reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
-from reports.view.live_scene import WORDS, LiveScene, Shown
-from reports.view.picture import LAYERS, Pictures, rgba
-from reports.view.reference import ReferenceInBackground, ViewError, motion_error, view_error
-from reports.view.server import Page
-from reports.view.widgets import (
+from airlight.analytic.clock import stopwatch
+from airlight.analytic.errors import InputError, nearest
+from airlight.realtime.errors import InputError as MethodError
+from airlight.realtime.methods.interface.method import method_parameters
+from airlight.realtime.methods.registry import METHODS, find_method
+from airlight.realtime.parameters import defaults, values
+from airlight.reports.plotting.pictures import ERROR_CEILING, ERROR_FLOOR, error_map, error_scale, exposure
+from airlight.reports.view.live_scene import WORDS, LiveScene, Shown
+from airlight.reports.view.picture import LAYERS, Pictures, rgba
+from airlight.reports.view.reference import ReferenceInBackground, ViewError, motion_error, view_error
+from airlight.reports.view.server import Page
+from airlight.reports.view.widgets import (
     ViewState,
     calls_kernel,
     kernel_widgets,
     method_widgets,
     parameter_widgets,
 )
-from validation.columns import plain
-from validation.scenes.changes import Values
-from validation.study.configuration import Configuration, configuration
+from airlight.validation.columns import plain
+from airlight.validation.scenes.changes import Values
+from airlight.validation.study.configuration import Configuration, configuration
 
 _AHEAD = 2  # frames that are sent before the page has shown the first of them
 _QUIET = 0.15  # after so long without a change the page is told where all stands [s]

@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
-from realtime.area_lights.points import LightSamples
-from realtime.kernels.registry import KERNELS
-from realtime.methods.interface.method import method_parameters
-from realtime.methods.registry import METHODS, find_method
-from realtime.parameters import limits_of
-from validation.scenes.changes import Values, change_words
-from validation.study.configuration import Configuration
+from airlight.realtime.area_lights.points import LightSamples
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.interface.method import method_parameters
+from airlight.realtime.methods.registry import METHODS, find_method
+from airlight.realtime.parameters import limits_of
+from airlight.validation.scenes.changes import Values, change_words
+from airlight.validation.study.configuration import Configuration
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ import pytest
 from mpmath import workdps
 from scipy.special import roots_legendre
 
-from analytic.droplets import Droplets, Modified, optics
-from analytic.errors import InputError
-from analytic.mie import angular_functions, coefficients, efficiencies, intensities
-from analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.droplets import Droplets, Modified, optics
+from airlight.analytic.errors import InputError
+from airlight.analytic.mie import angular_functions, coefficients, efficiencies, intensities
+from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.validation.certified.files import certified_data
+from airlight.validation.kernels.case_files import integrate_cases, read_cases
 from tests.helpers.hg_draine import hg_draine_moments, legendre_moments
-from validation.certified.files import certified_data
-from validation.kernels.case_files import integrate_cases, read_cases
 
 
 @pytest.mark.claim("mie-published", tolerance="1e-6, the digits that are printed")

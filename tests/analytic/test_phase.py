@@ -5,8 +5,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from analytic.phase import PhaseFunction
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import PhaseFunction
 
 SMOOTH = [
     PhaseFunction("isotropic"),

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from analytic.phase import PhaseFunction
-from analytic.series import taylor_coefficients
+from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.series import taylor_coefficients
 
 PHASES = [
     PhaseFunction("isotropic"),

@@ -16,10 +16,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reports.commands.main import run
+from airlight.reports.commands.main import run
+from airlight.validation.study.configuration import configuration
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.shaders import need_opengl
-from validation.study.configuration import configuration
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -139,11 +139,11 @@ def fog(tmp_path):
 def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
     """Steps in the angle without shifts are `ray-march`; twice as many come closer to the reference."""
 
-    from realtime.scene.read_scene import read_scene
-    from validation.estimates.quadrature import reference_image
-    from validation.study.reference import of_image
-    from validation.study.run import run
-    from validation.study.study import Cell, Measure
+    from airlight.realtime.scene.read_scene import read_scene
+    from airlight.validation.estimates.quadrature import reference_image
+    from airlight.validation.study.reference import of_image
+    from airlight.validation.study.run import run
+    from airlight.validation.study.study import Cell, Measure
 
     loaded = mi.load_dict(tiny_scene())
     scene, reference = read_scene(loaded), of_image(reference_image(loaded))
@@ -164,9 +164,9 @@ def test_the_worked_method_is_measured_like_a_built_in_one(fog, variant):
 
 @pytest.mark.claim("own-method")
 def test_the_plain_method_returns_what_the_page_says(fog, variant):
-    from realtime.frame.renderer import render_frame
-    from realtime.scene.read_scene import read_scene
-    from validation.study.configuration import prepared
+    from airlight.realtime.frame.renderer import render_frame
+    from airlight.realtime.scene.read_scene import read_scene
+    from airlight.validation.study.configuration import prepared
 
     scene = read_scene(mi.load_dict(tiny_scene()))
     frame = render_frame(prepared(scene, configuration(f"{fog.parent / 'plain.py'}:uniform_fog")))
@@ -178,8 +178,8 @@ def test_the_plain_method_returns_what_the_page_says(fog, variant):
 @pytest.mark.slow
 def test_the_kernel_of_the_page(variant, tmp_path, monkeypatch):
     """The snippet is what it says: `equiangular` with twelve steps."""
-    from validation.kernels.case_files import read_cases
-    from validation.kernels.cases import integrate_cases
+    from airlight.validation.kernels.case_files import read_cases
+    from airlight.validation.kernels.cases import integrate_cases
 
     code = blocks(DOCS / "your-method.md", "python")[2]
     (tmp_path / "twelve_steps_of_a_page.py").write_text(code)
@@ -236,7 +236,7 @@ def test_an_engine_that_knows_the_description_alone_is_called_right(
 @pytest.mark.claim("diagnosis-cycles")
 def test_what_is_set_wrong_in_cycles_is_named(variant, tmp_path, monkeypatch):
     """A right image, and faults of the medium, the light, the camera and the values."""
-    from validation.engine.diagnose import diagnose_file
+    from airlight.validation.engine.diagnose import diagnose_file
 
     injected = {
         "right": "right",

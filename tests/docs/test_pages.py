@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.commands.main import command_names, find_command
+from airlight.reports.commands.main import command_names, find_command
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -108,8 +108,8 @@ def test_formulas_are_mathml_and_slips_are_named(monkeypatch):
 
 @pytest.mark.claim("errata-of-biri", tolerance="1e-7 relative")
 def test_the_derived_coefficients_of_the_errata_are_those_of_the_program():
-    from analytic.phase import PhaseFunction
-    from analytic.series import taylor_coefficients
+    from airlight.analytic.phase import PhaseFunction
+    from airlight.analytic.series import taylor_coefficients
 
     means = {"isotropic": 1, "rayleigh": 1, "hazy": 2, "murky": 83 / 33}
     text = (DOCS / "papers.md").read_text(encoding="utf-8")

@@ -21,19 +21,19 @@ from typing import Any
 
 import numpy as np
 
-from realtime.kernels.registry import KERNELS
-from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
-from reference.quadrature.ray_values import ReferenceImage
-from validation.columns import plain
-from validation.estimates.quadrature import reference_image
-from validation.scenes.loading import load_scene
-from validation.scenes.registry import SCENES
-from validation.statistics.noise import ERROR_TOLERANCE, error_band
-from validation.study.configuration import STANDARD, Configuration
-from validation.study.reference import of_image
-from validation.study.run import run
-from validation.study.scene import configurations_for
-from validation.study.study import Cell, Measure
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.scene.read_scene import Scene, SceneFeatures, read_scene
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.validation.columns import plain
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.statistics.noise import ERROR_TOLERANCE, error_band
+from airlight.validation.study.configuration import STANDARD, Configuration
+from airlight.validation.study.reference import of_image
+from airlight.validation.study.run import run
+from airlight.validation.study.scene import configurations_for
+from airlight.validation.study.study import Cell, Measure
 
 FOLDER = Path(__file__).parent / "baselines"
 SIZE = (64, 48)  # of the images [pixels]
@@ -181,7 +181,7 @@ def main() -> int:
         parser.error(f"no built-in scene of fog: {', '.join(sorted(unknown))}; expected: {', '.join(SCATTER_ONCE)}")
     if asked.update and not asked.because.strip():
         parser.error("--update needs --because")
-    from reports.machine.environment import activate
+    from airlight.reports.machine.environment import activate
 
     activate()
     found = 0

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath import volpath_batch
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.replicates import PointPlan
-from reference.scene.read import ReferenceScene, read_reference
+from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.scene.read import ReferenceScene, read_reference
 from tests.evidence.certified.model import FogBox, FogScene, FogScreen, fog_scenes, load_fog, mitsuba_dict
 
 Scene = dict[str, Any]

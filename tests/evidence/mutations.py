@@ -14,16 +14,16 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs
-from reference.scene.read import ReferenceScene
+from airlight.reference.monte_carlo.single_scatter.distance_sampling import mixture_pdfs
+from airlight.reference.scene.read import ReferenceScene
 from tests.evidence.injected import Change, Put, Rewrite, Wrap
 
-_MEDIA = "reference.quadrature.homogeneous"
+_MEDIA = "airlight.reference.quadrature.homogeneous"
 _FIELD = f"{_MEDIA}:HomogeneousField.sums"
-_SAMPLES = "reference.quadrature.light_samples"
-_WEIGHTED = "reference.quadrature.area_lights"
-_SHADOWS = "reference.visibility.shadows"
-_TRACED = "reference.monte_carlo.single_scatter"
+_SAMPLES = "airlight.reference.quadrature.light_samples"
+_WEIGHTED = "airlight.reference.quadrature.area_lights"
+_SHADOWS = "airlight.reference.visibility.shadows"
+_TRACED = "airlight.reference.monte_carlo.single_scatter"
 _ESTIMATOR, _SOURCES = f"{_TRACED}.estimator", f"{_TRACED}.sources"
 _FOUR_PI = 4 * np.pi
 
@@ -48,7 +48,7 @@ def _sums(change: Callable[..., Any]) -> Wrap:
         radiance, bound = function(reference, *others, **named)
         return change(reference.medium, radiance), bound
 
-    return Wrap("reference.quadrature.light_airlight:lit_sums", around)
+    return Wrap("airlight.reference.quadrature.light_airlight:lit_sums", around)
 
 
 def _brighter(factor: float) -> Wrap:
@@ -101,14 +101,16 @@ def _phase(name: str, change: Callable[..., Any]) -> Wrap:
         value = function(self, down, up)
         return change(value, self.g) if self.name == name else value
 
-    return Wrap("analytic.phase:PhaseFunction.from_half", around)
+    return Wrap("airlight.analytic.phase:PhaseFunction.from_half", around)
 
 
-_BACKWARD = Wrap("analytic.phase:PhaseFunction.from_half", lambda function, self, down, up: function(self, up, down))
+_BACKWARD = Wrap(
+    "airlight.analytic.phase:PhaseFunction.from_half", lambda function, self, down, up: function(self, up, down)
+)
 
 
 def _read(change: Callable[[ReferenceScene], ReferenceScene]) -> Wrap:
-    return Wrap("reference.scene.read:read_reference", lambda function, scene: change(function(scene)))
+    return Wrap("airlight.reference.scene.read:read_reference", lambda function, scene: change(function(scene)))
 
 
 def _spots(change: Callable[..., Any]) -> Wrap:
@@ -116,7 +118,7 @@ def _spots(change: Callable[..., Any]) -> Wrap:
         light = function(emitter)
         return light if light.axis is None or light.cutoff > 3 else change(light)
 
-    return Wrap("reference.scene.read:_read_light", around)
+    return Wrap("airlight.reference.scene.read:_read_light", around)
 
 
 def _wide(light, cutoff: float):
@@ -151,7 +153,7 @@ def _lit(change: Callable[..., Any]) -> Wrap:
         ray = ray.astype(np.int64)
         return replace(found, ray=ray, low=rays.distance(low, ray), high=rays.distance(high, ray))
 
-    return Wrap("reference.visibility.lit_intervals:lit_intervals", around)
+    return Wrap("airlight.reference.visibility.lit_intervals:lit_intervals", around)
 
 
 def _complement(lit, low, high):
@@ -182,7 +184,7 @@ def _behind(function, reference, light, rays, lit, *others, **named):
 def _surface(change: Callable[..., Any]) -> Wrap:
     """Change the lit surface: change(function, reference, hits, named)."""
     return Wrap(
-        "reference.quadrature.surface:lit_surface",
+        "airlight.reference.quadrature.surface:lit_surface",
         lambda function, reference, hits, **named: change(function, reference, hits, named),
     )
 
@@ -258,7 +260,7 @@ def _sorted(emitters_are_opaque: bool) -> Wrap:
         others = [shape for shape in opaque if not shape.is_emitter()]
         return [*others, *emitters] if emitters_are_opaque else others, boundaries
 
-    return Wrap("reference.scene.read:sorted_shapes", around)
+    return Wrap("airlight.reference.scene.read:sorted_shapes", around)
 
 
 # --- Hooks of single-scatter ---
@@ -307,7 +309,7 @@ def _film(change: Callable[..., Any]) -> Wrap:
         middle = 0.5 * np.array(size, dtype=float)
         return function(sensor, middle + change(positions - middle), size)
 
-    return Wrap("reference.scene.camera:film_directions", around)
+    return Wrap("airlight.reference.scene.camera:film_directions", around)
 
 
 def _stepped(function, sensor):
@@ -328,7 +330,7 @@ _FOG = _all(
         "four-pi-twice": _brighter(1 / _FOUR_PI),
         "extinction-for-scattering": _sums(lambda medium, radiance: radiance / medium.albedo),
         "albedo-squared": _sums(lambda medium, radiance: radiance * medium.albedo),
-        "one-extinction": Wrap("reference.quadrature.light_airlight:lit_sums", _first_extinction),
+        "one-extinction": Wrap("airlight.reference.quadrature.light_airlight:lit_sums", _first_extinction),
         "one-per-cent": _brighter(1.01),
         "three-per-mille": _brighter(1.003),
         "one-per-mille": _brighter(1.001),
@@ -343,17 +345,19 @@ _FOG = _all(
         "henyey-greenstein-squared": _phase("hg", lambda value, g: (1 - g * g) * (value / (1 - g * g)) ** (2 / 3)),
         "radians-for-degrees": _spots(lambda light: _wide(light, np.rad2deg(light.cutoff) % np.pi)),
         "wide-spot": _spots(lambda light: _wide(light, 2 * light.cutoff)),
-        "falloff-in-the-cosine": Wrap("reference.visibility.planes:falloff", _linear_in_cosine),
-        "hard-spot": Wrap("reference.visibility.planes:falloff", lambda function, theta, *others: np.ones_like(theta)),
-        "first-light-only": Wrap("reference.quadrature.light_airlight:light_airlight", _one_light),
-        "no-light-behind": Wrap("reference.quadrature.light_airlight:lit_sums", _behind),
+        "falloff-in-the-cosine": Wrap("airlight.reference.visibility.planes:falloff", _linear_in_cosine),
+        "hard-spot": Wrap(
+            "airlight.reference.visibility.planes:falloff", lambda function, theta, *others: np.ones_like(theta)
+        ),
+        "first-light-only": Wrap("airlight.reference.quadrature.light_airlight:light_airlight", _one_light),
+        "no-light-behind": Wrap("airlight.reference.quadrature.light_airlight:lit_sums", _behind),
         "shadow-for-light": _lit(_complement),
         "no-shadows": _lit(lambda lit, low, high: [(low, high)]),
         "no-sphere-shadows": Wrap(
             f"{_SHADOWS}:_sphere", lambda function, *arguments: (mi.Float64(dr.inf), mi.Float64(-dr.inf))
         ),
         "through-surfaces": Wrap(
-            "reference.quadrature.light_airlight:light_airlight",
+            "airlight.reference.quadrature.light_airlight:light_airlight",
             lambda function, reference, light, distance, **how: function(reference, light, distance + np.inf, **how),
         ),
         "surface-bright-shadow-segment": _surface(_no_shadow_segment),
@@ -405,7 +409,7 @@ _SUN = _all(
         "directional-chord-both-ways": Rewrite(_MEDIA, "np.maximum(enter, 0.0)", "enter"),
         "directional-forward-is-backward": _BACKWARD,
         "directional-corners-behind": Rewrite(
-            "reference.quadrature.segments", "(y_ > 0) & (w_ * y_ < height_)", "(y_ < 0) & (w_ * y_ < height_)"
+            "airlight.reference.quadrature.segments", "(y_ > 0) & (w_ * y_ < height_)", "(y_ < 0) & (w_ * y_ < height_)"
         ),
         "directional-shadows-leaning-back": Rewrite(
             _SHADOWS, "z * self.height - y * self.foot", "z * self.height + y * self.foot"
@@ -413,7 +417,7 @@ _SUN = _all(
         "directional-no-shadows": _sun(lambda near: replace(near, triangles=_none(near.triangles))),
         "directional-no-sphere-shadows": _sun(lambda near: replace(near, spheres=_none(near.spheres))),
         "directional-surface-bright-segment": Rewrite(
-            "reference.quadrature.surface", "to_camera_ + optical_depth(a_, b_, c_, d_, e_)", "to_camera_"
+            "airlight.reference.quadrature.surface", "to_camera_ + optical_depth(a_, b_, c_, d_, e_)", "to_camera_"
         ),
     },
 )
@@ -435,14 +439,16 @@ _WIDE = _all(
         "area-sections-of-one-length": Rewrite(
             _SAMPLES, "h_ * np.hypot(a_, b_) * per_density_", "h_ * np.hypot(a_, b_).mean() * per_density_"
         ),
-        "area-shadows-itself": Wrap("reference.visibility.lit_intervals:before_light", _own_shape),
+        "area-shadows-itself": Wrap("airlight.reference.visibility.lit_intervals:before_light", _own_shape),
         "area-null-is-opaque": _sorted(True),
         "area-black-is-clear": _sorted(False),
         "area-surface-both-sides": Wrap(f"{_SAMPLES}:sections_for_points", _for_points),
         "area-surface-bright-segment": Rewrite(
             _WEIGHTED, "value_ * np.exp(-shadow_) * weight_[:, None]", "value_ * weight_[:, None]"
         ),
-        "area-surface-without-shadows": Wrap("reference.quadrature.area_lights:seen_samples", _through_everything),
+        "area-surface-without-shadows": Wrap(
+            "airlight.reference.quadrature.area_lights:seen_samples", _through_everything
+        ),
     },
 )
 
@@ -537,14 +543,14 @@ SHARED = _all(
     "certified",
     {
         "camera-pixel-corners": Wrap(
-            "reference.scene.camera:pixel_centres", lambda function, size: function(size) - 0.5
+            "airlight.reference.scene.camera:pixel_centres", lambda function, size: function(size) - 0.5
         ),
         "camera-mirrored": _film(lambda place: place * [-1.0, 1.0]),
         "camera-upside-down": _film(lambda place: place * [1.0, -1.0]),
         "camera-one-per-cent-wide": _film(lambda place: 1.01 * place),
-        "camera-stepped": Wrap("reference.scene.camera:camera_matrix", _stepped),
+        "camera-stepped": Wrap("airlight.reference.scene.camera:camera_matrix", _stepped),
         "read-scene-transposed": Wrap(
-            "reference.scene.camera:pixel_centres",
+            "airlight.reference.scene.camera:pixel_centres",
             lambda function, size: function(size).reshape(*size[::-1], 2).swapaxes(0, 1).reshape(-1, 2),
         ),
     },

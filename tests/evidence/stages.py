@@ -17,20 +17,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.monte_carlo import volpath
-from reference.monte_carlo.batches import LAYERS, Batches, merged
-from reference.monte_carlo.single_scatter import integrator as single_scatter
-from reference.quadrature import image as quadrature
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import PointPlan
-from reference.scene import read
-from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.reference.monte_carlo import volpath
+from airlight.reference.monte_carlo.batches import LAYERS, Batches, merged
+from airlight.reference.monte_carlo.single_scatter import integrator as single_scatter
+from airlight.reference.quadrature import image as quadrature
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.scene import read
+from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.validation.estimates.agreement import batch_estimate, layer_masks, reference_estimate, width_to_reach
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.statistics.comparison import compare_statistics
 from tests.evidence.injected import injected
 from tests.evidence.mutations import Mutation
 from tests.helpers.probes import PROBES, WIDE_PROBES
-from validation.estimates.agreement import batch_estimate, layer_masks, reference_estimate, width_to_reach
-from validation.scenes.loading import load_scene, resize
-from validation.statistics.comparison import compare_statistics
 
 #: Margins of the relative bias of quadrature against single-scatter, by stage: of airlight and surface [1]. Each fault
 #: that is found on a stage exceeds one of them.

@@ -12,13 +12,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.phase import PhaseFunction
-from reference.quadrature.homogeneous import HomogeneousField
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.stretches import Terms, lit_stretches, profile_of
-from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
-from reference.visibility.certificate import LitIntervals
-from reference.visibility.planes import Rays, cone_interval
+from airlight.analytic.phase import PhaseFunction
+from airlight.reference.quadrature.homogeneous import HomogeneousField
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.stretches import Terms, lit_stretches, profile_of
+from airlight.reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, read_reference
+from airlight.reference.visibility.certificate import LitIntervals
+from airlight.reference.visibility.planes import Rays, cone_interval
 from tests.evidence.certified import area_lights
 from tests.evidence.certified.fog import certify_pixel, directions, scene_data
 from tests.evidence.certified.model import FogBox, FogScreen, fog_scenes, load_fog, mitsuba_dict

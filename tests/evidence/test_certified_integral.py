@@ -9,7 +9,7 @@ from flint import arb, ctx
 from mpmath import mpf, workdps
 
 import tests.evidence.certified.integral as module
-from analytic.phase import PhaseFunction
+from airlight.analytic.phase import PhaseFunction
 from tests.evidence.certified.airlight_integral import FILES, enclosure, read, value
 from tests.evidence.certified.integral import integrate_certified, isotropic_closed_form
 

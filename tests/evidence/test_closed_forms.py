@@ -5,17 +5,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.geometry import foot_and_height
-from analytic.panels import airlight_segments
-from realtime.scene.read_scene import read_scene
-from realtime.shadow_maps.projection import Projection
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
-from reference.scene.read import read_reference
+from airlight.analytic.geometry import foot_and_height
+from airlight.analytic.panels import airlight_segments
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.shadow_maps.projection import Projection
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
+from airlight.reference.scene.read import read_reference
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.metrics.errors import error_metrics
 from tests.evidence.closed_forms import polygon_in_disk, polygon_overlap
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import error_metrics
 
 
 def test_polygons_by_counting_points():

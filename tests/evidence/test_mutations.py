@@ -12,18 +12,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from reference.monte_carlo.slab_walk import estimates
-from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
-from reference.monte_carlo.slab_walk.walk import Slab
-from reference.quadrature import image as quadrature
-from reference.scene import read
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from airlight.reference.monte_carlo.slab_walk import estimates
+from airlight.reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
+from airlight.reference.monte_carlo.slab_walk.walk import Slab
+from airlight.reference.quadrature import image as quadrature
+from airlight.reference.scene import read
+from airlight.validation.certified.files import certified_data
+from airlight.validation.slab import moments
 from tests.evidence import stages
 from tests.evidence.certified.model import load_fog
 from tests.evidence.injected import Rewrite, injected, replacements, rewritten
 from tests.evidence.mutations import BELOW_THE_MARGIN, MUTATIONS, SHARED
-from validation.certified.files import certified_data
-from validation.slab import moments
 
 #: Faults that the default tier tries besides those of the quadrature on its stages: 32 batches and their own kernels.
 QUICK = ("traced-shadow-epsilon",)
@@ -132,8 +132,8 @@ def test_the_certified_scenes_find_what_all_fraction(certified, mutation):
 
 TAU, MU0, ALBEDO, DEPTH = 1.5, 0.6, 0.8, 0.5
 SETS = [(1, 1), (2, 2), (3, math.inf)]
-MOMENTS = "validation.slab.moments"
-WALK = "reference.monte_carlo.slab_walk.walk"
+MOMENTS = "airlight.validation.slab.moments"
+WALK = "airlight.reference.monte_carlo.slab_walk.walk"
 
 FAULTS = {
     "four pi": (MOMENTS, "albedo / (4 * np.pi)", "albedo / 4"),

@@ -6,7 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from reference.scene.read import read_reference
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.density_grid import ROUGH, grid_xml, volume
 from tests.helpers.height_fog import LAMP
 from tests.helpers.transmittance import (
@@ -17,7 +18,6 @@ from tests.helpers.transmittance import (
     ratio_tracking,
     transmittance_errors,
 )
-from validation.scenes.loading import load_scene
 
 TIMES = 200_000
 

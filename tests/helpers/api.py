@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """For tests of `import airlight`: a small image, a method and a kernel of one's own."""
 
-from realtime.kernels.exact import exact
-from realtime.methods.unshadowed import unshadowed
+from airlight.realtime.kernels.exact import exact
+from airlight.realtime.methods.unshadowed import unshadowed
 
 TINY = (16, 12)
 

@@ -7,14 +7,20 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.quadrature.area_lights import AreaAirlight, area_airlight, beams_of, seen_samples, turn_of_sections
-from reference.quadrature.light_samples import sections_for_points
-from reference.quadrature.replicates import REPLICATES, PointPlan, square_points
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import ReferenceScene, read_reference
-from reference.visibility.candidates import Ball
-from reference.visibility.lit_intervals import before_light, obstacles
-from validation.scenes.meshes import Mesh, placed, rotation, scaled, torus
+from airlight.reference.quadrature.area_lights import (
+    AreaAirlight,
+    area_airlight,
+    beams_of,
+    seen_samples,
+    turn_of_sections,
+)
+from airlight.reference.quadrature.light_samples import sections_for_points
+from airlight.reference.quadrature.replicates import REPLICATES, PointPlan, square_points
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.read import ReferenceScene, read_reference
+from airlight.reference.visibility.candidates import Ball
+from airlight.reference.visibility.lit_intervals import before_light, obstacles
+from airlight.validation.scenes.meshes import Mesh, placed, rotation, scaled, torus
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0, 0.0, 0.0]}}
 NULL = {"type": "null"}

@@ -248,7 +248,7 @@ def _finite_file(path: Path) -> bool:
     """Return whether a file, or all images of a report, hold nothing that is not finite; a distance may be infinite."""
     import numpy as np
 
-    from reference.storage.exr import read_exr
+    from airlight.reference.storage.exr import read_exr
 
     if path.suffix == ".csv":
         header, *lines = (line.split(",") for line in path.read_text().split("\n") if line)
@@ -259,7 +259,7 @@ def _finite_file(path: Path) -> bool:
 
 def _fault(order: list[str]) -> str:
     """Run a command in this process; return what is wrong with it, if anything."""
-    from reports.commands.main import run
+    from airlight.reports.commands.main import run
 
     output, errors = io.StringIO(), io.StringIO()
     written = Path(order[order.index("-o") + 1]) if "-o" in order else None
@@ -295,8 +295,8 @@ def _fault(order: list[str]) -> str:
 
 
 def _child(kind: str, path: Path, report: Path) -> None:
-    from reports.machine.environment import activate
-    from validation.study import study as studies
+    from airlight.reports.machine.environment import activate
+    from airlight.validation.study import study as studies
 
     os.environ["AIRLIGHT_CACHE_DIR"] = str(path.parent / "cache")
     activate()

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import binom, nct
 
-from validation.statistics.comparison import LEVEL, NoisyImage, Statistics, compare_statistics
-from validation.statistics.samples import student_quantile, uniformity_p
+from airlight.validation.statistics.comparison import LEVEL, NoisyImage, Statistics, compare_statistics
+from airlight.validation.statistics.samples import student_quantile, uniformity_p
 
 Array = NDArray[np.float64]
 Law = Callable[[np.random.Generator, tuple[int, ...]], Array]  #: draws numbers of mean 0 and standard deviation 1

@@ -6,8 +6,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from validation.scenes.meshes import placed, rotation, torus
-from validation.scenes.parts import camera, medium_boundary
+from airlight.validation.scenes.meshes import placed, rotation, torus
+from airlight.validation.scenes.parts import camera, medium_boundary
 
 TURN = rotation((1.0, 0.4, 0.2), 63.1)
 DROPLETS = {"type": "homogeneous", "sigma_t": 0.0363, "albedo": 1.0, "phase": {"type": "hg", "g": 0.85}}

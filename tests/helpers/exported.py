@@ -3,9 +3,9 @@
 
 import json
 
-from realtime.methods.shader.client import ShaderHost
-from reports.api.export import MEASURED
-from reports.machine.driver_check import driver_error
+from airlight.realtime.methods.shader.client import ShaderHost
+from airlight.reports.api.export import MEASURED
+from airlight.reports.machine.driver_check import driver_error
 
 KERNELS = ("exact", "quadrature-16")
 PHASES = ("isotropic", "rayleigh", "hazy", "murky", "hg", "hg-draine:5", "hg-draine:12", "hg-draine:50")

@@ -11,12 +11,12 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.methods.registry import METHODS
-from realtime.scene.read_scene import Scene, read_scene
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
-from validation.study.configuration import find_kernel
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.validation.study.configuration import find_kernel
 
 _FRAMES: dict[Any, Any] = {}
 

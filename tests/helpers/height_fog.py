@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analytic.geometry import foot_and_height
-from analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
-from analytic.phase import PhaseFunction
-from validation.certified.files import certified_data
+from airlight.analytic.geometry import foot_and_height
+from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
+from airlight.analytic.phase import PhaseFunction
+from airlight.validation.certified.files import certified_data
 
 #: Two layers between a floor under the ground and a cap.
 FOG = """<volume type="heightfog" name="sigma_t">

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from analytic.phase import hg_draine_fit
+from airlight.analytic.phase import hg_draine_fit
 
 
 def hg_draine_moments(diameter: float, count: int):

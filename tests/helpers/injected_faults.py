@@ -14,17 +14,17 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.phase import PhaseFunction
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import PointPlan
-from reference.scene.area_light import is_area
-from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.directional_light import is_directional
-from reference.scene.read import ReferenceLight, ReferenceScene
-from validation.engine.curves import agx, blender_filmic, filmic, to_srgb
-from validation.estimates.quadrature import reference_layer
-from validation.fog_model.view import Scenery
+from airlight.analytic.phase import PhaseFunction
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.scene.area_light import is_area
+from airlight.reference.scene.camera import film_directions, pixel_centres
+from airlight.reference.scene.directional_light import is_directional
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.validation.engine.curves import agx, blender_filmic, filmic, to_srgb
+from airlight.validation.estimates.quadrature import reference_layer
+from airlight.validation.fog_model.view import Scenery
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,14 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.panels import airlight_segments
-from analytic.phase import PhaseFunction
-from realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import Phase, named_phase
-from validation.kernels.case_files import Cases
+from airlight.analytic.panels import airlight_segments
+from airlight.analytic.phase import PhaseFunction
+from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import Phase, named_phase
+from airlight.validation.kernels.case_files import Cases
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@
 import mitsuba as mi
 import numpy as np
 
-from realtime.shadow_maps.shadow_map import cast_shadow_map
-from reference.scene.read import read_reference
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
+from airlight.reference.scene.read import read_reference
 from tests.evidence.oracles.light_volume import oracle_airlight, traced_walls
 from tests.helpers.frames import read, render
 from tests.helpers.scenes import spot, tiny_scene

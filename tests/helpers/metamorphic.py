@@ -12,9 +12,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.scenes.meshes import box, placed
-from validation.scenes.parts import medium_boundary, mitsuba_mesh
-from validation.scenes.registry import SCENES
+from airlight.validation.scenes.meshes import box, placed
+from airlight.validation.scenes.parts import medium_boundary, mitsuba_mesh
+from airlight.validation.scenes.registry import SCENES
 
 Array = NDArray[np.float64]
 Description = dict[str, Any]

@@ -7,7 +7,7 @@ Arbitrary numbers throughout; no vertex occurs twice within a mesh.
 
 import numpy as np
 
-from validation.scenes.meshes import Mesh, box, grid, icosphere, joined, placed, rotation, torus
+from airlight.validation.scenes.meshes import Mesh, box, grid, icosphere, joined, placed, rotation, torus
 
 _TURN = rotation((0.3, 1.0, -0.2), 27.1)
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from PIL import Image as Picture
 
-from reference.storage.exr import Image, write_exr
-from reports.data.records import Report, named_files
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.reports.data.records import Report, named_files
 from tests.helpers.reports import agreement, checked, engine, entry, errors, flip, report_of, scene, settings
 
 WIDTH, HEIGHT = 32, 24

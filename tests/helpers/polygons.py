@@ -5,11 +5,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.surface import surface_hits
-from reference.visibility.candidates import Ball
-from reference.visibility.distances import exact_distance
-from reference.visibility.lit_intervals import obstacles
-from reference.visibility.planes import cone_interval, rays_at
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.visibility.candidates import Ball
+from airlight.reference.visibility.distances import exact_distance
+from airlight.reference.visibility.lit_intervals import obstacles
+from airlight.reference.visibility.planes import cone_interval, rays_at
 from tests.helpers.scenes import tiny_scene
 
 

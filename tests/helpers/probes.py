@@ -16,7 +16,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from validation.scenes.parts import area_lamp, camera, fog, point_light
+from airlight.validation.scenes.parts import area_lamp, camera, fog, point_light
 
 
 def many_lights() -> dict[str, Any]:

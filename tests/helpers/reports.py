@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from reports.data.records import Report
-from validation.columns import record_of
-from validation.statistics.records import Statistics
+from airlight.reports.data.records import Report
+from airlight.validation.columns import record_of
+from airlight.validation.statistics.records import Statistics
 
 LABELS = ("unshadowed (exact)", "ray-march (steps=100)", "shadow-planes (exact)", "light-volumes (exact)")
 SCENES = ("fog", "hall", "pens")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.machine.opengl import opengl_status
+from airlight.reports.machine.opengl import opengl_status
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 

@@ -8,10 +8,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.scene.camera import ray_directions
+from airlight.realtime.scene.camera import ray_directions
+from airlight.validation.scenes.meshes import box, placed, rotation
+from airlight.validation.scenes.parts import medium_boundary
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
-from validation.scenes.meshes import box, placed, rotation
-from validation.scenes.parts import medium_boundary
 
 Array = NDArray[np.float64]
 

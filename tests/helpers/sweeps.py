@@ -8,7 +8,7 @@ import json
 import numpy as np
 from PIL import Image
 
-from validation.study.row import COLUMNS, arrow_schema, property_names
+from airlight.validation.study.row import COLUMNS, arrow_schema, property_names
 
 #: method, kernel, parameters, and the median of its error, its spread in e-folds, and its time [ms].
 METHODS = (

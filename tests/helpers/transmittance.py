@@ -24,10 +24,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference.quadrature.fields import field_of
-from reference.scene.read import ReferenceScene
-from reference.scene.varying import GridMedium
-from validation.arrays import Array, Index
+from airlight.reference.quadrature.fields import field_of
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.varying import GridMedium
+from airlight.validation.arrays import Array, Index
 
 Look = Callable[[Array], Array]  # fractions of a ray, any shape -> optical depth of the whole ray if all were as there
 

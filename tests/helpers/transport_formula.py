@@ -7,8 +7,8 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-import realtime.methods.cloud_collectors as method
-from realtime.clouds import collector_search
+import airlight.realtime.methods.cloud_collectors as method
+from airlight.realtime.clouds import collector_search
 
 WEIGHTS = [0.02, 0.04, 0.03, 0.01, 0.05, 0.03, 0.02, 0.06]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from realtime.methods.interface.method import Layers, Method
-from realtime.parameters import parameter
+from airlight.realtime.methods.interface.method import Layers, Method
+from airlight.realtime.parameters import parameter
 
 
 @dataclass(frozen=True)

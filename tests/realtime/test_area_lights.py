@@ -5,13 +5,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.area_lights.points import PATTERNS, place_points
-from realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices, turned_area_light
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.area_lights.points import PATTERNS, place_points
+from airlight.realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices, turned_area_light
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import rotation
 from tests.helpers.lamps import area_lamp
 from tests.helpers.meshes import directed_edges, volume
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.meshes import rotation
 
 AXES = rotation((0.3, -1.0, 0.7), 37.0)
 MIDDLE = np.array([0.7, -1.3, 2.9])

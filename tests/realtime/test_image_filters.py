@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.image_filters import (
+from airlight.realtime.image_filters import (
     Guide,
     Raster,
     bilateral,

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from realtime.intervals import (
+from airlight.realtime.intervals import (
     add_waiting,
     close_interval,
     exchange,
@@ -19,7 +19,7 @@ from realtime.intervals import (
     open_interval,
     sum_at_end,
 )
-from realtime.numerics.array_types import aligned_array
+from airlight.realtime.numerics.array_types import aligned_array
 
 RAYS, STEPS = 24, 7
 GAINS = arrays(np.int64, (RAYS, STEPS), elements=st.integers(-2, 2))

@@ -5,9 +5,9 @@ import os
 
 import pytest
 
-import realtime.memory
-from realtime.errors import InputError
-from realtime.memory import Memory, check_memory, usable_memory
+import airlight.realtime.memory
+from airlight.realtime.errors import InputError
+from airlight.realtime.memory import Memory, check_memory, usable_memory
 
 MACHINE = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
@@ -22,9 +22,9 @@ def limits(variant, tmp_path, monkeypatch):
             (tmp_path / "cgroup" / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / "cgroup" / name).write_text(text)
 
-    monkeypatch.setattr(realtime.memory, "_OWN_CGROUPS", tmp_path / "self")
-    monkeypatch.setattr(realtime.memory, "_CGROUPS", tmp_path / "cgroup")
-    monkeypatch.setattr(realtime.memory.mi, "variant", lambda: "llvm_ad_rgb")
+    monkeypatch.setattr(airlight.realtime.memory, "_OWN_CGROUPS", tmp_path / "self")
+    monkeypatch.setattr(airlight.realtime.memory, "_CGROUPS", tmp_path / "cgroup")
+    monkeypatch.setattr(airlight.realtime.memory.mi, "variant", lambda: "llvm_ad_rgb")
     return write
 
 

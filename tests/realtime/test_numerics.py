@@ -10,15 +10,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import frame_renderer, run_stages
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import METHODS
-from realtime.numerics.array_types import array_types
-from realtime.numerics.functions import WIDEST, exp2_bounded, exp_bounded, exp_expm1_bounded, sinh_bounded
-from realtime.numerics.recorded import Frozen
-from realtime.scene.animate import read_objects, turned_objects
-from realtime.scene.read_scene import read_scene
-from validation.scenes.loading import load_scene
+from airlight.realtime.frame.renderer import frame_renderer, run_stages
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.numerics.functions import WIDEST, exp2_bounded, exp_bounded, exp_expm1_bounded, sinh_bounded
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.scene.animate import read_objects, turned_objects
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.loading import load_scene
 
 WHOLE = np.append(np.linspace(-87, 88, 1_000_001), np.outer([-1, 1], np.geomspace(1e-30, 1, 10_000)))
 

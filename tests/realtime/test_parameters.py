@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from realtime.errors import InputError
-from realtime.parameters import Parameters, defaults, parameter, read_parameters, values
+from airlight.realtime.errors import InputError
+from airlight.realtime.parameters import Parameters, defaults, parameter, read_parameters, values
 
 
 @dataclass(frozen=True)

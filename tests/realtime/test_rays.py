@@ -8,12 +8,12 @@ import pytest
 from mpmath import mp
 from scipy.integrate import quad
 
-from realtime.kernels.registry import KERNELS
-from realtime.numerics.array_types import array_types
-from realtime.rays import ray_geometry
-from realtime.scene.lights import Facing, Light, spot_fields
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import HenyeyGreenstein, Isotropic
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.rays import ray_geometry
+from airlight.realtime.scene.lights import Facing, Light, spot_fields
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import HenyeyGreenstein, Isotropic
 from tests.helpers.kernel_values import opaque, vectors
 
 

@@ -6,10 +6,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.methods.soft_shafts.sources import source_state
-from realtime.scene.light_samples import light_samples
-from realtime.scene.read_scene import read_scene
-from realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map
+from airlight.realtime.methods.soft_shafts.sources import source_state
+from airlight.realtime.scene.light_samples import light_samples
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map
 from tests.helpers.lamps import lamp_scene
 from tests.helpers.scenes import spot, tiny_scene
 

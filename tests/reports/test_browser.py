@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.storage.exr import read_exr
-from reports.page.render import render_page
-from reports.plotting.pictures import error_map, tone_mapped
+from airlight.reference.storage.exr import read_exr
+from airlight.reports.page.render import render_page
+from airlight.reports.plotting.pictures import error_map, tone_mapped
 from tests.helpers.page import HEIGHT, WIDTH, small_report, write_files
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -132,7 +132,7 @@ def command(page):
 
 @pytest.mark.claim("view-camera", "view-widgets")
 def test_the_view_moves_changes_and_shows_the_error(browser):
-    arguments = [sys.executable, str(ROOT / "airlight.py"), "view", "sphere-spot", "--size", "64x48"]
+    arguments = [sys.executable, "-m", "airlight", "view", "sphere-spot", "--size", "64x48"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         address = process.stdout.readline().strip()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from validation.columns import Column, column, columns_of, flat, plain, values_of
+from airlight.validation.columns import Column, column, columns_of, flat, plain, values_of
 
 
 @dataclass(frozen=True)

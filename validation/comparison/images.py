@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analytic.errors import InputError
-from reference.storage.exr import BATCHES, BOUND, NOTE, TOTAL, Image, layer_names, read_exr
-from reference.storage.exr import layer as image_layer
-from validation.arrays import Array, Bools
-from validation.columns import columns_of, shown_values
-from validation.metrics.colour import ColourDifference, colour_difference
-from validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
-from validation.metrics.flip import Flip, flip_hdr
-from validation.metrics.other_tools import PublishedErrors, published_errors
-from validation.statistics.comparison import LEVEL, NoisyImage, check_margin, compare_statistics
-from validation.statistics.estimate import Answer, Estimate, Kind
-from validation.statistics.records import Statistics
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import BATCHES, BOUND, NOTE, TOTAL, Image, layer_names, read_exr
+from airlight.reference.storage.exr import layer as image_layer
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.columns import columns_of, shown_values
+from airlight.validation.metrics.colour import ColourDifference, colour_difference
+from airlight.validation.metrics.errors import Metrics, compared, error_metrics, wrong_pixels
+from airlight.validation.metrics.flip import Flip, flip_hdr
+from airlight.validation.metrics.other_tools import PublishedErrors, published_errors
+from airlight.validation.statistics.comparison import LEVEL, NoisyImage, check_margin, compare_statistics
+from airlight.validation.statistics.estimate import Answer, Estimate, Kind
+from airlight.validation.statistics.records import Statistics
 
 _ORDER = re.compile(r"airlight_\d+(_(\d+|inf))?")
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from validation.arrays import Array
+from airlight.validation.arrays import Array
 
 
 def to_srgb(linear: Array) -> Array:

@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError
-from reference.storage.exr import NOTE, Image, read_exr
-from validation.arrays import Progress
-from validation.engine.error_place import place_words
-from validation.engine.evidence import EVIDENCE, KNOWN, LEFT, Blocks, evidence, scale_of
-from validation.engine.fault import Fault
-from validation.engine.faults import KINDS, faults_of
-from validation.engine.judge import EngineComparison, ReferenceOf, all_but_few, judge_image, references
-from validation.engine.prediction import Predictor, SceneLight
-from validation.engine.search import Explanation, begin, explain
-from validation.engine.seen import (
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import NOTE, Image, read_exr
+from airlight.validation.arrays import Progress
+from airlight.validation.engine.error_place import place_words
+from airlight.validation.engine.evidence import EVIDENCE, KNOWN, LEFT, Blocks, evidence, scale_of
+from airlight.validation.engine.fault import Fault
+from airlight.validation.engine.faults import KINDS, faults_of
+from airlight.validation.engine.judge import EngineComparison, ReferenceOf, all_but_few, judge_image, references
+from airlight.validation.engine.prediction import Predictor, SceneLight
+from airlight.validation.engine.search import Explanation, begin, explain
+from airlight.validation.engine.seen import (
     PIXEL_WORDS,
     decide_pixel,
     judged_layer,
@@ -36,7 +36,7 @@ from validation.engine.seen import (
     scene_of_size,
     seen_image,
 )
-from validation.scenes.loading import LoadedScene
+from airlight.validation.scenes.loading import LoadedScene
 
 RIGHT, BLACK, UNEXPLAINED = "right", "black", "unexplained"
 

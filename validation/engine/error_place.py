@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_dilation, laplace, maximum_filter, minimum_filter
 
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import ReferenceScene
-from validation.arrays import Array, Bools
-from validation.engine.prediction import Predictor
-from validation.engine.search import Explanation
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.read import ReferenceScene
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.engine.prediction import Predictor
+from airlight.validation.engine.search import Explanation
 
 _MOST = 0.9  # fraction of the squared error that is most of it
 _FEW = 0.01  # fraction of the pixels that counts as few

@@ -26,9 +26,9 @@ from pathlib import Path
 
 import numpy as np
 
-from validation.arrays import Array, Bools, Index
-from validation.engine.prediction import Predictor
-from validation.engine.search import Explanation, usual_size
+from airlight.validation.arrays import Array, Bools, Index
+from airlight.validation.engine.prediction import Predictor
+from airlight.validation.engine.search import Explanation, usual_size
 
 #: Relative error of the fog model itself, in most pixels: of pixel centres the quadrature's, of means 3 x 3 rays'.
 KNOWN = {"centre": 3e-4, "area": 3e-3}

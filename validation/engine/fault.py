@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.engine.prediction import Guess, Layers, Predictor
-from validation.engine.seen import stopped
-from validation.fog_model.radiance import Fog
+from airlight.validation.arrays import Array
+from airlight.validation.engine.prediction import Guess, Layers, Predictor
+from airlight.validation.engine.seen import stopped
+from airlight.validation.fog_model.radiance import Fog
 
 Values = tuple[float, ...]
 Change = Callable[[Predictor, Guess, Values], Guess]

@@ -7,13 +7,13 @@ fault back from a whole image, without any path of light.
 
 from dataclasses import replace
 
-from validation.engine.fault import Fault, of_fog_alone, traits, with_scenery
-from validation.engine.image_faults import BRIGHTNESS, CAMERA, VALUES
-from validation.engine.layer_faults import FOG_AND_SURFACES, factor_fault, scaled
-from validation.engine.light_faults import LIGHTS
-from validation.engine.media_faults import MEDIUM
-from validation.engine.prediction import Predictor
-from validation.fog_model.view import light_sources
+from airlight.validation.engine.fault import Fault, of_fog_alone, traits, with_scenery
+from airlight.validation.engine.image_faults import BRIGHTNESS, CAMERA, VALUES
+from airlight.validation.engine.layer_faults import FOG_AND_SURFACES, factor_fault, scaled
+from airlight.validation.engine.light_faults import LIGHTS
+from airlight.validation.engine.media_faults import MEDIUM
+from airlight.validation.engine.prediction import Predictor
+from airlight.validation.fog_model.view import light_sources
 
 _MANY_LIGHTS = 6  # of more, a fault of a single one is not looked for
 

@@ -17,11 +17,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from validation.arrays import Array
-from validation.engine.faults import FAULTS
-from validation.engine.image_faults import BRIGHTNESS
-from validation.engine.seen import stopped
-from validation.metrics.errors import FLOOR
+from airlight.validation.arrays import Array
+from airlight.validation.engine.faults import FAULTS
+from airlight.validation.engine.image_faults import BRIGHTNESS
+from airlight.validation.engine.seen import stopped
+from airlight.validation.metrics.errors import FLOOR
 
 GAIN = 10.0  #: how many times smaller the error must become for a suspect to be named
 LEAST = 0.01  #: relative error below which nothing is suspected

@@ -7,10 +7,10 @@ from itertools import permutations, product
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.engine.curves import PRIMARIES, TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_pq, to_srgb
-from validation.engine.fault import Change, Fault, Number, Values, changed_values, scenery_number, top, undone
-from validation.engine.prediction import Guess, Predictor
+from airlight.validation.arrays import Array
+from airlight.validation.engine.curves import PRIMARIES, TONE_CURVES, from_srgb, gamma, srgb_in_8_bits, to_pq, to_srgb
+from airlight.validation.engine.fault import Change, Fault, Number, Values, changed_values, scenery_number, top, undone
+from airlight.validation.engine.prediction import Guess, Predictor
 
 
 def shifted(predictor: Predictor, guess: Guess, p: Values) -> Guess:

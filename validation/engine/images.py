@@ -16,13 +16,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError, nearest
-from reference.storage.exr import read_exr
-from validation.engine.judge import EngineComparison, ReferenceOf, judge_image
-from validation.engine.seen import AIRLIGHT, SURFACE, judged_layer
-from validation.metrics.errors import Metrics, error_metrics
-from validation.scenes.loading import LoadedScene
-from validation.timing import Timing
+from airlight.analytic.errors import InputError, nearest
+from airlight.reference.storage.exr import read_exr
+from airlight.validation.engine.judge import EngineComparison, ReferenceOf, judge_image
+from airlight.validation.engine.seen import AIRLIGHT, SURFACE, judged_layer
+from airlight.validation.metrics.errors import Metrics, error_metrics
+from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.timing import Timing
 
 TIMES = "times.json"  #: what lies beside images and says how long they took
 

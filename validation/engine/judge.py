@@ -31,15 +31,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import REPLICATES
-from reference.scene.read import read_reference
-from reference.storage.exr import BATCHES, NOTE, TOTAL, Image, read_exr
-from validation.arrays import Array, Bools, Progress
-from validation.comparison.images import Comparison, compare_images, read_mask
-from validation.engine.error_place import ErrorPlace, error_place
-from validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
-from validation.engine.seen import (
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import REPLICATES
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.exr import BATCHES, NOTE, TOTAL, Image, read_exr
+from airlight.validation.arrays import Array, Bools, Progress
+from airlight.validation.comparison.images import Comparison, compare_images, read_mask
+from airlight.validation.engine.error_place import ErrorPlace, error_place
+from airlight.validation.engine.hints import GAIN, OUTLIERS, Hints, find_hints
+from airlight.validation.engine.seen import (
     KINDS,
     PIXEL_WORDS,
     JudgedLayer,
@@ -51,18 +51,18 @@ from validation.engine.seen import (
     relative_errors,
     scene_of_size,
 )
-from validation.estimates.agreement import pixel_angle
-from validation.estimates.quadrature import (
+from airlight.validation.estimates.agreement import pixel_angle
+from airlight.validation.estimates.quadrature import (
     known_to,
     known_words,
     reference_error,
     reference_image,
     reference_layer,
 )
-from validation.metrics.errors import FLOOR
-from validation.scenes.loading import LoadedScene
-from validation.statistics.comparison import block_sums, check_margin
-from validation.statistics.estimate import Estimate
+from airlight.validation.metrics.errors import FLOOR
+from airlight.validation.scenes.loading import LoadedScene
+from airlight.validation.statistics.comparison import block_sums, check_margin
+from airlight.validation.statistics.estimate import Estimate
 
 ReferenceOf = Callable[[str], ReferenceImage]  #: returns the reference for 'centre' or 'area'
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.engine.fault import (
+from airlight.validation.arrays import Array
+from airlight.validation.engine.fault import (
     Change,
     Fault,
     Number,
@@ -18,9 +18,9 @@ from validation.engine.fault import (
     of_surfaces_alone,
     scenery_number,
 )
-from validation.engine.image_faults import SHIFT, best_corner, shifted
-from validation.engine.light_faults import PLACE, at_position, position_held
-from validation.engine.prediction import Guess, Layers, Predictor
+from airlight.validation.engine.image_faults import SHIFT, best_corner, shifted
+from airlight.validation.engine.light_faults import PLACE, at_position, position_held
+from airlight.validation.engine.prediction import Guess, Layers, Predictor
 
 
 def scaled(entry: str, lights: Sequence[int] | None = None) -> Change:

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.engine.fault import (
+from airlight.validation.arrays import Array
+from airlight.validation.engine.fault import (
     Change,
     Fault,
     Number,
@@ -19,8 +19,8 @@ from validation.engine.fault import (
     with_law,
     with_scenery,
 )
-from validation.engine.prediction import Guess, Predictor
-from validation.fog_model.view import Scenery
+from airlight.validation.engine.prediction import Guess, Predictor
+from airlight.validation.fog_model.view import Scenery
 
 
 def _window(factor: Callable[..., Array]) -> Change:

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from analytic.height_fog import HeightFog, Layer
-from reference.scene.camera import camera_matrix
-from reference.scene.read import ReferenceScene
-from validation.arrays import Array
-from validation.engine.curves import from_srgb, to_srgb
-from validation.engine.fault import (
+from airlight.analytic.height_fog import HeightFog, Layer
+from airlight.reference.scene.camera import camera_matrix
+from airlight.reference.scene.read import ReferenceScene
+from airlight.validation.arrays import Array
+from airlight.validation.engine.curves import from_srgb, to_srgb
+from airlight.validation.engine.fault import (
     Change,
     Fault,
     Number,
@@ -22,8 +22,8 @@ from validation.engine.fault import (
     short,
     with_law,
 )
-from validation.engine.prediction import Guess, Layers, Predictor
-from validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
+from airlight.validation.engine.prediction import Guess, Layers, Predictor
+from airlight.validation.fog_model.radiance import Colour, Fog, PhaseLaw, colour
 
 _FACTOR = (0.5, 0.7, 1.4, 2.0)
 _SHIFT = Number(-100.0, 100.0, (-10.0, -2.0, -0.5, 0.5, 2.0, 10.0))  # of heights [m]

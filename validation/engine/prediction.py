@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from reference.monte_carlo.batches import LAYERS
-from reference.monte_carlo.volpath import volpath_batch
-from reference.scene.read import ReferenceScene
-from validation.arrays import Array, Bools, Index
-from validation.engine.seen import APART, Seen, relative_errors
-from validation.fog_model.radiance import Fog, FogModel, scene_fog
-from validation.fog_model.view import Ends, Scenery, View
+from airlight.reference.monte_carlo.batches import LAYERS
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.scene.read import ReferenceScene
+from airlight.validation.arrays import Array, Bools, Index
+from airlight.validation.engine.seen import APART, Seen, relative_errors
+from airlight.validation.fog_model.radiance import Fog, FogModel, scene_fog
+from airlight.validation.fog_model.view import Ends, Scenery, View
 
 Layers = Callable[[Array, Array], tuple[Array, Array]]  #: of airlight and surfaces, (m, 3) each
 

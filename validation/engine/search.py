@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from validation.arrays import Array, Bools
-from validation.engine.fault import Fault, Number, Values
-from validation.engine.prediction import Guess, Predictor
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.engine.fault import Fault, Number, Values
+from airlight.validation.engine.prediction import Guess, Predictor
 
 _LEAST_SCALE, _LEAST_COARSE = 1e-4, 1e-2  # where most pixels do not know a parameter, those that do are no outliers
 _COARSE = 0.02  # on a line, of a logarithm or in units of the parameter: enough to tell faults apart

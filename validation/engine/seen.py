@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from analytic.errors import InputError
-from reference.quadrature.emission import emitted_light
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import ReferenceScene, read_reference
-from reference.scene.varying import GridMedium
-from reference.storage.exr import TOTAL, Image, layer, layer_names
-from validation.arrays import Array, Bools, Index
-from validation.estimates.quadrature import reference_layer
-from validation.fog_model.radiance import FogModel, scene_fog
-from validation.fog_model.view import SAMPLES, SCENERY, Ends, Scenery, View, scattering_paths, view_of
-from validation.metrics.errors import wrong_pixels
-from validation.scenes.loading import LoadedScene, load_scene
+from airlight.analytic.errors import InputError
+from airlight.reference.quadrature.emission import emitted_light
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.read import ReferenceScene, read_reference
+from airlight.reference.scene.varying import GridMedium
+from airlight.reference.storage.exr import TOTAL, Image, layer, layer_names
+from airlight.validation.arrays import Array, Bools, Index
+from airlight.validation.estimates.quadrature import reference_layer
+from airlight.validation.fog_model.radiance import FogModel, scene_fog
+from airlight.validation.fog_model.view import SAMPLES, SCENERY, Ends, Scenery, View, scattering_paths, view_of
+from airlight.validation.metrics.errors import wrong_pixels
+from airlight.validation.scenes.loading import LoadedScene, load_scene
 
 Found = TypeVar("Found")  #: what an attempt at an image is
 

@@ -23,17 +23,17 @@ from typing import Any, cast
 
 import numpy as np
 
-from analytic.clock import stopwatch
-from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, allocated
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import REPLICATES
-from reference.scene.read import ReferenceScene, read_reference
-from reference.scene.shadow_epsilon import measure_shadow_epsilon
-from validation.arrays import Array, Bools
-from validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
-from validation.estimates.quadrature import reference_error, reference_image, reference_layer
-from validation.statistics.comparison import NoisyImage, compare_statistics
-from validation.statistics.records import Agreement, Statistics
+from airlight.analytic.clock import stopwatch
+from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, allocated
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import REPLICATES
+from airlight.reference.scene.read import ReferenceScene, read_reference
+from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.estimates.monte_carlo import ElsewhereFor, monte_carlo_batches
+from airlight.validation.estimates.quadrature import reference_error, reference_image, reference_layer
+from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
+from airlight.validation.statistics.records import Agreement, Statistics
 
 MASK_PIXELS = 2.0
 _LEAST_BATCHES = 32  # below, the standard error of a standard error exceeds 13 %

@@ -22,22 +22,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from analytic.clock import stopwatch
-from analytic.errors import InputError
-from analytic.geometry import foot_and_height
-from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
-from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import REPLICATES
-from reference.quadrature.surface import surface_hits
-from reference.scene.clouds import read_clouds
-from reference.scene.read import ReferenceScene, read_reference
-from reference.storage.exr import BATCHES, BOUND, Image
-from reference.storage.scene_digest import scene_digest
-from validation.arrays import Array, Bools, Progress
-from validation.estimates.agreement import MASK_PIXELS, pixel_angle
-from validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
-from validation.scenes.loading import LoadedScene
+from airlight.analytic.clock import stopwatch
+from airlight.analytic.errors import InputError
+from airlight.analytic.geometry import foot_and_height
+from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
+from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import REPLICATES
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.clouds import read_clouds
+from airlight.reference.scene.read import ReferenceScene, read_reference
+from airlight.reference.storage.exr import BATCHES, BOUND, Image
+from airlight.reference.storage.scene_digest import scene_digest
+from airlight.validation.arrays import Array, Bools, Progress
+from airlight.validation.estimates.agreement import MASK_PIXELS, pixel_angle
+from airlight.validation.estimates.monte_carlo import Elsewhere, monte_carlo_batches
+from airlight.validation.scenes.loading import LoadedScene
 
 LEAST_BATCHES = 32  #: before a standard error is good enough to stop on
 USUAL_BATCH = 64  #: samples a pixel
@@ -165,7 +165,7 @@ def monte_carlo_reference(
 
 def cloud_orders(words: str) -> tuple[str, ...]:
     """Return the sets of orders that words name, disjoint: '1,2,3-4', 'sets' for the usual ones, 'all' for none."""
-    from validation.slab.request import order_range, parse_orders
+    from airlight.validation.slab.request import order_range, parse_orders
 
     names = tuple(name for name in parse_orders(words) if name != "all")
     ranges = sorted(order_range(name) for name in names)

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analytic.errors import InputError
-from reference.monte_carlo.batches import LAYERS, combined_moments, parse_seed_ranges, seed_ranges
-from reference.storage.exr import TOTAL, Attribute, Image
-from validation.arrays import Array
+from airlight.analytic.errors import InputError
+from airlight.reference.monte_carlo.batches import LAYERS, combined_moments, parse_seed_ranges, seed_ranges
+from airlight.reference.storage.exr import TOTAL, Attribute, Image
+from airlight.validation.arrays import Array
 
 #: Headers that must be the same in all files, and their meanings.
 _SAME = {

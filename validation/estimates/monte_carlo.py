@@ -18,22 +18,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.clock import Spent, stopwatch
-from analytic.errors import InputError
-from reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, merged
-from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch, set_layers
-from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath import volpath_batch, volpath_orders_batch
-from reference.quadrature.surface import surface_hits
-from reference.scene.clouds import read_clouds
-from reference.scene.read import read_reference
-from reference.storage.cache import cache_folder
-from reference.storage.files import NO_SPACE
-from reference.storage.scene_digest import scene_content
-from reference.storage.store import Content, Inputs, add_spent, counted, drop, is_damaged, is_kept, load, store
-from validation.arrays import Counted
-from validation.estimates.quadrature import check_camera, check_rays
+from airlight.analytic.clock import Spent, stopwatch
+from airlight.analytic.errors import InputError
+from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, merged
+from airlight.reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch, set_layers
+from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds
+from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from airlight.reference.monte_carlo.volpath import volpath_batch, volpath_orders_batch
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.clouds import read_clouds
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.cache import cache_folder
+from airlight.reference.storage.files import NO_SPACE
+from airlight.reference.storage.scene_digest import scene_content
+from airlight.reference.storage.store import Content, Inputs, add_spent, counted, drop, is_damaged, is_kept, load, store
+from airlight.validation.arrays import Counted
+from airlight.validation.estimates.quadrature import check_camera, check_rays
 
 Trace = Callable[[int], Batches]  # from the seed
 
@@ -73,21 +73,21 @@ class SingleScatterInputs(BatchInputs):
     """The inputs of batches by `single-scatter`."""
 
     kind = "single-scatter"
-    modules = ("reference.monte_carlo.single_scatter.integrator",)
+    modules = ("airlight.reference.monte_carlo.single_scatter.integrator",)
 
 
 class VolpathInputs(BatchInputs):
     """The inputs of batches by `volpath`."""
 
     kind = "volpath"
-    modules = ("reference.monte_carlo.volpath",)
+    modules = ("airlight.reference.monte_carlo.volpath",)
 
 
 class CloudPathInputs(BatchInputs):
     """The inputs of batches by `cloud-paths`."""
 
     kind = "cloud-paths"
-    modules = ("reference.monte_carlo.cloud_paths.integrator",)
+    modules = ("airlight.reference.monte_carlo.cloud_paths.integrator",)
 
 
 _INPUTS = {each.kind: each for each in (SingleScatterInputs, VolpathInputs, CloudPathInputs)}
@@ -197,7 +197,7 @@ def batch_tracer(
         if estimator == "single-scatter" and max_depth == 2 and counts is None:
             return LAYERS, lambda seed: single_scatter_batch(reference, seed, samples)
     else:
-        from validation.slab.request import order_range
+        from airlight.validation.slab.request import order_range
 
         clouds, sets, layers = read_clouds(scene), [(name, order_range(name)) for name in orders], set_layers(orders)
         if estimator == "volpath":

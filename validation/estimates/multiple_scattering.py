@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from reference.monte_carlo.batches import LAYERS
-from validation.arrays import Array
-from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.statistics.records import Fraction, MultipleScattering
-from validation.statistics.samples import student_quantile
+from airlight.reference.monte_carlo.batches import LAYERS
+from airlight.validation.arrays import Array
+from airlight.validation.estimates.monte_carlo import monte_carlo_batches
+from airlight.validation.statistics.records import Fraction, MultipleScattering
+from airlight.validation.statistics.samples import student_quantile
 
 
 def multiple_scattering_fraction(

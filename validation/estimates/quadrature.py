@@ -30,20 +30,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.clock import stopwatch
-from analytic.errors import InputError
-from analytic.geometry import foot_and_height
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import Keep, PointPlan
-from reference.quadrature.surface import surface_hits
-from reference.scene.convex_bounds import holds
-from reference.scene.read import ReferenceLight, ReferenceScene, read_reference
-from reference.storage.exr import TOTAL
-from reference.storage.scene_digest import scene_content
-from reference.storage.store import Content, Inputs, Kept, load, store, stored
-from validation.arrays import Array, Bools, Counted
-from validation.statistics.estimate import UNKNOWN, Estimate, Kind
+from airlight.analytic.clock import stopwatch
+from airlight.analytic.errors import InputError
+from airlight.analytic.geometry import foot_and_height
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import Keep, PointPlan
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.convex_bounds import holds
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene, read_reference
+from airlight.reference.storage.exr import TOTAL
+from airlight.reference.storage.scene_digest import scene_content
+from airlight.reference.storage.store import Content, Inputs, Kept, load, store, stored
+from airlight.validation.arrays import Array, Bools, Counted
+from airlight.validation.statistics.estimate import UNKNOWN, Estimate, Kind
 
 _ROUNDING = 2.0**-24
 

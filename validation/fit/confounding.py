@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.fit.unknowns import Unknown
+from airlight.validation.arrays import Array
+from airlight.validation.fit.unknowns import Unknown
 
 _ZERO = 1e-6  # singular value over the largest: rounding of float64 sums is 1e-12, real dependence on anything 1e-4
 _SILENT = 1e-12  # length of a column over the longest: a parameter that does nothing

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from analytic.clock import stopwatch
-from analytic.errors import InputError
-from reference.scene.read import ReferenceScene
-from reference.storage.exr import NOTE, Image
-from validation.arrays import Array, Bools, Progress
-from validation.engine.prediction import Predictor, SceneLight
-from validation.engine.seen import (
+from airlight.analytic.clock import stopwatch
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.storage.exr import NOTE, Image
+from airlight.validation.arrays import Array, Bools, Progress
+from airlight.validation.engine.prediction import Predictor, SceneLight
+from airlight.validation.engine.seen import (
     PIXEL_WORDS,
     Seen,
     decide_pixel,
@@ -24,8 +24,8 @@ from validation.engine.seen import (
     seen_image,
     stopped,
 )
-from validation.fit.confounding import Confounded, Group, confounded, confounded_groups
-from validation.fit.solve import (
+from airlight.validation.fit.confounding import Confounded, Group, confounded, confounded_groups
+from airlight.validation.fit.solve import (
     SIGMAS,
     Model,
     Solution,
@@ -35,9 +35,9 @@ from validation.fit.solve import (
     robust_fit,
     weighted_fit,
 )
-from validation.fit.unknowns import Unknown, read_unknowns
-from validation.metrics.errors import FLOOR
-from validation.scenes.loading import LoadedScene
+from airlight.validation.fit.unknowns import Unknown, read_unknowns
+from airlight.validation.metrics.errors import FLOOR
+from airlight.validation.scenes.loading import LoadedScene
 
 _MOVES = 12  # rounds in which lit intervals are found again
 _STILL = 1e-6  # of the distance of a light from the camera: it does not move any more

@@ -44,11 +44,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares, nnls
 
-from validation.arrays import Array, Bools
-from validation.engine.fault import Number
-from validation.engine.prediction import Guess, Predictor
-from validation.engine.search import guess_of, inward, outward
-from validation.fit.unknowns import Unknown
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.engine.fault import Number
+from airlight.validation.engine.prediction import Guess, Predictor
+from airlight.validation.engine.search import guess_of, inward, outward
+from airlight.validation.fit.unknowns import Unknown
 
 SIGMAS = 1.959964  #: standard errors in half of a 95 % interval
 

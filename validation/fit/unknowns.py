@@ -26,13 +26,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analytic.errors import InputError, nearest
-from analytic.height_fog import HeightFog
-from reference.scene.read import ReferenceScene
-from validation.engine.fault import Fault, Number, Values
-from validation.engine.prediction import Guess, Predictor
-from validation.fog_model.radiance import Fog, Path, colour, scene_fog
-from validation.fog_model.view import light_sources
+from airlight.analytic.errors import InputError, nearest
+from airlight.analytic.height_fog import HeightFog
+from airlight.reference.scene.read import ReferenceScene
+from airlight.validation.engine.fault import Fault, Number, Values
+from airlight.validation.engine.prediction import Guess, Predictor
+from airlight.validation.fog_model.radiance import Fog, Path, colour, scene_fog
+from airlight.validation.fog_model.view import light_sources
 
 CHANNELS = ("r", "g", "b")
 AXES = ("x", "y", "z")

@@ -26,19 +26,19 @@ from typing import Any
 
 import numpy as np
 
-from analytic.panels import equal_panels
-from reference.quadrature.height_fog import fog_of
-from reference.quadrature.homogeneous import smooth_pieces
-from reference.quadrature.light_airlight import LitRays, sun_stretches
-from reference.quadrature.pieces import Pieces, by_medium, cut, whole
-from reference.quadrature.segments import camera_segments
-from reference.quadrature.stretches import Stretches, lit_stretches, profile_of
-from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import ReferenceLight, ReferenceScene
-from reference.scene.varying import HeightMedium
-from reference.visibility.distances import crossings
-from reference.visibility.planes import falloff, rays_at
-from validation.arrays import Array, Bools, Index
+from airlight.analytic.panels import equal_panels
+from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.quadrature.homogeneous import smooth_pieces
+from airlight.reference.quadrature.light_airlight import LitRays, sun_stretches
+from airlight.reference.quadrature.pieces import Pieces, by_medium, cut, whole
+from airlight.reference.quadrature.segments import camera_segments
+from airlight.reference.quadrature.stretches import Stretches, lit_stretches, profile_of
+from airlight.reference.scene.directional_light import DirectionalLight
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.varying import HeightMedium
+from airlight.reference.visibility.distances import crossings
+from airlight.reference.visibility.planes import falloff, rays_at
+from airlight.validation.arrays import Array, Bools, Index
 
 AROUND = 0  #: number of the medium without bounds; the media with bounds count on from there
 

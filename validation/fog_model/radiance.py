@@ -22,13 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from analytic.height_fog import HeightFog
-from reference.quadrature.height_fog import fog_of
-from reference.scene.read import ReferenceScene
-from reference.scene.varying import HeightMedium
-from validation.arrays import Array
-from validation.fog_model.places import AROUND, Places
-from validation.fog_model.view import Ends, LightPaths, View
+from airlight.analytic.height_fog import HeightFog
+from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.varying import HeightMedium
+from airlight.validation.arrays import Array
+from airlight.validation.fog_model.places import AROUND, Places
+from airlight.validation.fog_model.view import Ends, LightPaths, View
 
 Colour = tuple[float, float, float]
 Path = tuple[str | int, ...]  #: of a number in a fog: fields, and places in tuples

@@ -12,23 +12,23 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.quadrature.light_airlight import LitRays, lit_rays
-from reference.quadrature.replicates import PointPlan, square_points
-from reference.quadrature.shared_samples import shared_samples
-from reference.quadrature.surface import surface_hits
-from reference.scene.area_light import ReferenceAreaLight, is_area
-from reference.scene.camera import camera_matrix, film_directions, pixel_centres
-from reference.scene.device import as_rows, on_device, vectors
-from reference.scene.directional_light import DirectionalLight, is_directional
-from reference.scene.read import ReferenceLight, ReferenceScene
-from reference.scene.shapes import read_shapes
-from reference.scene.varying import HeightMedium
-from reference.visibility.candidates import Ball
-from reference.visibility.certificate import LitIntervals
-from reference.visibility.distances import exact_distance
-from reference.visibility.lit_intervals import before_light, obstacles
-from validation.arrays import Array, Bools, Index
-from validation.fog_model.places import Places, lengths, no_places, parallel_nodes, point_nodes, surface_points
+from airlight.reference.quadrature.light_airlight import LitRays, lit_rays
+from airlight.reference.quadrature.replicates import PointPlan, square_points
+from airlight.reference.quadrature.shared_samples import shared_samples
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.area_light import ReferenceAreaLight, is_area
+from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
+from airlight.reference.scene.device import as_rows, on_device, vectors
+from airlight.reference.scene.directional_light import DirectionalLight, is_directional
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.scene.shapes import read_shapes
+from airlight.reference.scene.varying import HeightMedium
+from airlight.reference.visibility.candidates import Ball
+from airlight.reference.visibility.certificate import LitIntervals
+from airlight.reference.visibility.distances import exact_distance
+from airlight.reference.visibility.lit_intervals import before_light, obstacles
+from airlight.validation.arrays import Array, Bools, Index
+from airlight.validation.fog_model.places import Places, lengths, no_places, parallel_nodes, point_nodes, surface_points
 
 Light = ReferenceLight | DirectionalLight
 #: Distances between which a fog is [m], and of what: 'planes' before the camera or 'spheres' around it; 'depth': the

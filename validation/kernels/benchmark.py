@@ -16,24 +16,24 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.clock import Spent
-from analytic.errors import InputError
-from realtime.errors import InputError as RealtimeInputError
-from realtime.kernels.registry import KERNELS, Kernel
-from realtime.numerics.array_types import aligned_array
-from realtime.numerics.recorded import Frozen
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import named_phase
-from validation.arrays import Counted
-from validation.clock import Piece, in_turns, timed, timing_of
-from validation.kernels.case_files import Cases
-from validation.kernels.cases import TABLE
-from validation.kernels.errors import errors_by_group
-from validation.kernels.rays import wide_rays
-from validation.kernels.records import ErrorLevel, KernelCost, RayTime
-from validation.study.configuration import find_kernel, sized, split_name
+from airlight.analytic.clock import Spent
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.realtime.kernels.registry import KERNELS, Kernel
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import named_phase
+from airlight.validation.arrays import Counted
+from airlight.validation.clock import Piece, in_turns, timed, timing_of
+from airlight.validation.kernels.case_files import Cases
+from airlight.validation.kernels.cases import TABLE
+from airlight.validation.kernels.errors import errors_by_group
+from airlight.validation.kernels.rays import wide_rays
+from airlight.validation.kernels.records import ErrorLevel, KernelCost, RayTime
+from airlight.validation.study.configuration import find_kernel, sized, split_name
 
 RAYS = 480_000  # 800 x 600
 ERROR_RAYS = 6000

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError
-from analytic.geometry import foot_and_height
-from analytic.panels import airlight_segments
-from analytic.phase import PhaseFunction, phase_from_words
-from validation.arrays import Array, Bools
-from validation.readers import read_csv
+from airlight.analytic.errors import InputError
+from airlight.analytic.geometry import foot_and_height
+from airlight.analytic.panels import airlight_segments
+from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.readers import read_csv
 
 _RAY = ("ox", "oy", "oz", "dx", "dy", "dz", "lx", "ly", "lz")
 _FOOT = ("foot", "height")

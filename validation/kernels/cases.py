@@ -12,17 +12,17 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analytic.errors import InputError
-from realtime.errors import InputError as RealtimeInputError
-from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays import RayGeometry, ray_geometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import named_phase
-from reference.storage.files import write_text
-from validation.arrays import Array, Index
-from validation.kernels.case_files import Cases
-from validation.study.configuration import find_kernel
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.realtime.rays import RayGeometry, ray_geometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import named_phase
+from airlight.reference.storage.files import write_text
+from airlight.validation.arrays import Array, Index
+from airlight.validation.kernels.case_files import Cases
+from airlight.validation.study.configuration import find_kernel
 
 Kernel = Callable[..., Any]
 

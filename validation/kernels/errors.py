@@ -34,12 +34,12 @@ from functools import cache
 
 import numpy as np
 
-from analytic.phase import PhaseFunction, phase_from_words
-from validation.arrays import Array, Bools
-from validation.kernels.case_files import Cases
-from validation.kernels.cases import TABLE, relative_error
-from validation.kernels.rays import case_row
-from validation.kernels.records import KernelErrors
+from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.kernels.case_files import Cases
+from airlight.validation.kernels.cases import TABLE, relative_error
+from airlight.validation.kernels.rays import case_row
+from airlight.validation.kernels.records import KernelErrors
 
 _NODES = 8
 _LARGEST_DEPTH = 87.0

@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import qmc
 
-from analytic.phase import PHASE_NAMES
-from reference.storage.store import Inputs, stored
-from validation.arrays import Array
-from validation.kernels.case_files import Cases, integrate_cases
-from validation.kernels.cases import TABLE
+from airlight.analytic.phase import PHASE_NAMES
+from airlight.reference.storage.store import Inputs, stored
+from airlight.validation.arrays import Array
+from airlight.validation.kernels.case_files import Cases, integrate_cases
+from airlight.validation.kernels.cases import TABLE
 
 COLUMNS = ("tag", "phase", "g", "t", "h", "x0", "x1", "sigma_t", "value")
 

@@ -8,15 +8,15 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from realtime.kernels.registry import KERNELS, Kernel
-from validation.arrays import Array, Bools, Counted
-from validation.certified.files import certified_data
-from validation.kernels.case_files import Cases, read_cases
-from validation.kernels.cases import evaluate_accepted
-from validation.kernels.errors import errors_by_group, groups
-from validation.kernels.rays import hard_rays
-from validation.kernels.records import Rays, Stability
-from validation.study.configuration import find_kernel
+from airlight.realtime.kernels.registry import KERNELS, Kernel
+from airlight.validation.arrays import Array, Bools, Counted
+from airlight.validation.certified.files import certified_data
+from airlight.validation.kernels.case_files import Cases, read_cases
+from airlight.validation.kernels.cases import evaluate_accepted
+from airlight.validation.kernels.errors import errors_by_group, groups
+from airlight.validation.kernels.rays import hard_rays
+from airlight.validation.kernels.records import Rays, Stability
+from airlight.validation.study.configuration import find_kernel
 
 CERTIFIED = ("airlight_integral.csv", "airlight_integral_rays.csv")
 GENERATED = "generated"

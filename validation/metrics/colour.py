@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from validation.arrays import Array
-from validation.columns import column
-from validation.metrics.errors import colours, compared
+from airlight.validation.arrays import Array
+from airlight.validation.columns import column
+from airlight.validation.metrics.errors import colours, compared
 
 WHITE_LUMINANCE = 203.0  #: luminance of white [cd/m^2], the reference white of BT.2408
 PEAK_LUMINANCE = 1000.0  #: the brightest that the screen shows [cd/m^2]

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analytic.errors import InputError
-from validation.arrays import Array, Bools
-from validation.columns import column
+from airlight.analytic.errors import InputError
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.columns import column
 
 FLOOR = 1e-3  #: the least denominator of a relative error, as a fraction of the mean of the reference
 RADIANCE = "W/(m^2 sr)"

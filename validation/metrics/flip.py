@@ -29,11 +29,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analytic.errors import InputError
-from reference.storage.files import temporary_folder
-from validation.arrays import Array
-from validation.columns import column
-from validation.metrics.errors import colours, compared
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.files import temporary_folder
+from airlight.validation.arrays import Array
+from airlight.validation.columns import column
+from airlight.validation.metrics.errors import colours, compared
 
 PIXELS_PER_DEGREE = 67.0  #: of visual angle: a screen of 3840 pixels, 0.7 m wide, seen from 0.7 m
 TIMEOUT = 300.0  #: seconds that the child may take; a megapixel takes a few

@@ -41,10 +41,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analytic.errors import InputError
-from validation.arrays import Array
-from validation.columns import column, record_of
-from validation.metrics.errors import FLOOR, RADIANCE, compared
+from airlight.analytic.errors import InputError
+from airlight.validation.arrays import Array
+from airlight.validation.columns import column, record_of
+from airlight.validation.metrics.errors import FLOOR, RADIANCE, compared
 
 EPSILON = 0.01  #: added to denominators by tev, pbrt, SimpleImageIO and JERI [units of radiance]
 EPSILON_JERI_SQUARED = 1e-4  #: JERI's under squares, 0.01 squared

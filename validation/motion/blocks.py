@@ -8,9 +8,9 @@ these matrices are kept. Blocks are collected in at most `GROUPS` groups, neighb
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.statistics.estimate import UNKNOWN, Estimate
-from validation.statistics.samples import widened
+from airlight.validation.arrays import Array
+from airlight.validation.statistics.estimate import UNKNOWN, Estimate
+from airlight.validation.statistics.samples import widened
 
 BLOCK = 8  #: side of a block [pixels]
 GROUPS = 100  #: their scatter gives a standard error to 7 %

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError, nearest
-from validation.readers import Reader, by_name, read_list, read_number, read_word
+from airlight.analytic.errors import InputError, nearest
+from airlight.validation.readers import Reader, by_name, read_list, read_number, read_word
 
 SCHEMA = "airlight-frames/1"
 _MARK = "#"

@@ -21,23 +21,30 @@ from pathlib import Path
 
 import numpy as np
 
-from analytic.errors import InputError
-from reference.scene.camera import film_positions
-from reference.scene.read import ReferenceScene, read_reference
-from reference.storage.exr import NOTE, read_exr
-from reference.storage.files import temporary_folder
-from validation.arrays import Array, Bools, Index, Progress
-from validation.engine.judge import lamp_distance
-from validation.engine.seen import PIXELS, JudgedLayer, expected_layer, judged_layer, pixel_kinds, scene_of_size
-from validation.estimates.quadrature import known_to, known_words, reference_image, relative_error
-from validation.motion.blocks import BLOCK
-from validation.motion.frames_file import FramesRecord, frame_paths, read_frames
-from validation.motion.lag import SURE, Lag
-from validation.motion.measures import AGES, Measures, Sequence, measure
-from validation.scenes.changes import move_shapes, shift_film
-from validation.scenes.loading import load_scene
-from validation.statistics.estimate import Answer, Estimate, fact
-from validation.statistics.samples import UNTOLD_SERIES
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.camera import film_positions
+from airlight.reference.scene.read import ReferenceScene, read_reference
+from airlight.reference.storage.exr import NOTE, read_exr
+from airlight.reference.storage.files import temporary_folder
+from airlight.validation.arrays import Array, Bools, Index, Progress
+from airlight.validation.engine.judge import lamp_distance
+from airlight.validation.engine.seen import (
+    PIXELS,
+    JudgedLayer,
+    expected_layer,
+    judged_layer,
+    pixel_kinds,
+    scene_of_size,
+)
+from airlight.validation.estimates.quadrature import known_to, known_words, reference_image, relative_error
+from airlight.validation.motion.blocks import BLOCK
+from airlight.validation.motion.frames_file import FramesRecord, frame_paths, read_frames
+from airlight.validation.motion.lag import SURE, Lag
+from airlight.validation.motion.measures import AGES, Measures, Sequence, measure
+from airlight.validation.scenes.changes import move_shapes, shift_film
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.statistics.estimate import Answer, Estimate, fact
+from airlight.validation.statistics.samples import UNTOLD_SERIES
 
 _ROUNDING = 1e-6  # relative error of exact frames in files of float32
 _FACTOR = 1e-5  # relative: a gain nearer to 1 is not worth a word

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear, minimize_scalar
 
-from validation.arrays import Array
-from validation.motion.blocks import BLOCK, estimates, held, products, told_apart
-from validation.statistics.estimate import UNKNOWN, Answer, Estimate
+from airlight.validation.arrays import Array
+from airlight.validation.motion.blocks import BLOCK, estimates, held, products, told_apart
+from airlight.validation.statistics.estimate import UNKNOWN, Answer, Estimate
 
 CELL = 4  #: side of a cell [pixels]
 TAPS = 16  #: of the impulse response [frames]

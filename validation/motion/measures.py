@@ -24,12 +24,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from validation.arrays import Array, Bools
-from validation.motion.blocks import products, regression, relative_root
-from validation.motion.lag import CELL, DARK, Cells, Lag, filtered_frames, fit_lag
-from validation.statistics.comparison import block_sums
-from validation.statistics.estimate import UNKNOWN, Estimate
-from validation.statistics.samples import mean_of_runs, mean_of_series
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.motion.blocks import products, regression, relative_root
+from airlight.validation.motion.lag import CELL, DARK, Cells, Lag, filtered_frames, fit_lag
+from airlight.validation.statistics.comparison import block_sums
+from airlight.validation.statistics.estimate import UNKNOWN, Estimate
+from airlight.validation.statistics.samples import mean_of_runs, mean_of_series
 
 _Record = TypeVar("_Record", "Measures", Lag)
 

@@ -44,17 +44,17 @@ from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 from scipy.stats import nct
 
-from analytic.errors import InputError
-from reference.storage.exr import read_exr
-from validation.arrays import Array, Progress
-from validation.engine.images import image_times
-from validation.engine.judge import fitting_kind, references
-from validation.engine.seen import expected_layer, judged_layer, pixel_kinds, scene_of_size
-from validation.estimates.quadrature import known_to, known_words
-from validation.motion.blocks import estimates, parts_of_error, products
-from validation.motion.lag import SURE
-from validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
-from validation.statistics.samples import first_equal, mean_of_runs, student, student_quantile
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import read_exr
+from airlight.validation.arrays import Array, Progress
+from airlight.validation.engine.images import image_times
+from airlight.validation.engine.judge import fitting_kind, references
+from airlight.validation.engine.seen import expected_layer, judged_layer, pixel_kinds, scene_of_size
+from airlight.validation.estimates.quadrature import known_to, known_words
+from airlight.validation.motion.blocks import estimates, parts_of_error, products
+from airlight.validation.motion.lag import SURE
+from airlight.validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
+from airlight.validation.statistics.samples import first_equal, mean_of_runs, student, student_quantile
 
 RINGS = 8  #: of the error spectrum, from 0 to 1/2 cycle a pixel
 BLURS = (1.0, 2.0, 4.0)  #: deviations of Gaussians [pixels]

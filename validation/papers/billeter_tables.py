@@ -18,20 +18,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from realtime.errors import InputError as RealtimeError
-from realtime.frame.renderer import Frame, FrameRenderer, render_frame
-from realtime.scene.read_scene import Scene, read_scene
-from validation.arrays import Array
-from validation.clock import time_repeated, timed
-from validation.estimates.quadrature import reference_of_pixels
-from validation.metrics.errors import error_metrics
-from validation.papers.claims import Figure, quartiles
-from validation.scenes.loading import load_scene, resize
-from validation.scenes.parts import light
-from validation.scenes.registry import SCENES
-from validation.study.configuration import configuration, prepared
-from validation.study.frame_times import moved_light
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as RealtimeError
+from airlight.realtime.frame.renderer import Frame, FrameRenderer, render_frame
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.validation.arrays import Array
+from airlight.validation.clock import time_repeated, timed
+from airlight.validation.estimates.quadrature import reference_of_pixels
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.papers.claims import Figure, quartiles
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.scenes.parts import light
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.study.configuration import configuration, prepared
+from airlight.validation.study.frame_times import moved_light
 
 SIZE = (1024, 1024)  #: of the published images [pixels]
 MAPS = (1024, 2048, 4096)  #: of Table 1 [texels]

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import read_scene
-from validation.clock import time_in_turns
-from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import error_metrics, known
-from validation.papers.claims import quartiles
-from validation.scenes.loading import load_scene, resize
-from validation.study.configuration import configuration, prepared
-from validation.study.frame_times import moved_light
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.clock import time_in_turns
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.metrics.errors import error_metrics, known
+from airlight.validation.papers.claims import quartiles
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.study.configuration import configuration, prepared
+from airlight.validation.study.frame_times import moved_light
 
 _COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these references [pixels]
 _SECONDS = 0.1  # for each timing [s]

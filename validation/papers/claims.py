@@ -22,7 +22,7 @@ from functools import cache, reduce
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from validation.statistics.estimate import Answer
+from airlight.validation.statistics.estimate import Answer
 
 VERDICTS = REPRODUCED, NOT_REPRODUCED, DIFFERS, IMPOSSIBLE = "reproduced", "not reproduced", "differs", "impossible"
 EFFORTS = ("quick", "default", "full", "paper")
@@ -118,7 +118,7 @@ class Experiment:
     def run(self) -> dict[str, Any]:
         """Return the `Figures`."""
         module, function = self.function.split(":")
-        return getattr(importlib.import_module(f"validation.papers.{module}"), function)()
+        return getattr(importlib.import_module(f"airlight.validation.papers.{module}"), function)()
 
 
 @cache

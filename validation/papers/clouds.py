@@ -18,23 +18,23 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.clouds.canonical.coordinates import SETS, order_layer
-from realtime.clouds.collector_search import Collector
-from realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
-from realtime.methods.registry import METHODS
-from realtime.scene.mesh_adjacency import mesh_triangles
-from realtime.scene.read_scene import Scene, read_scene
-from reference.scene.clouds import CloudScene, read_clouds
-from validation.arrays import Array, Bools, Progress
-from validation.clock import time_repeated
-from validation.estimates.images import Budget, monte_carlo_reference
-from validation.papers.claims import INTERVAL, Figure, quartiles
-from validation.scenes.loading import LoadedScene, load_scene, resize
-from validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
-from validation.scenes.registry import SCENES
-from validation.statistics.samples import LEVEL, student_quantile
-from validation.study.frame_times import first_frame
-from validation.timing import Timing
+from airlight.realtime.clouds.canonical.coordinates import SETS, order_layer
+from airlight.realtime.clouds.collector_search import Collector
+from airlight.realtime.frame.renderer import frame_renderer, render_frame, run_cast_and_shade, run_method
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.mesh_adjacency import mesh_triangles
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.scene.clouds import CloudScene, read_clouds
+from airlight.validation.arrays import Array, Bools, Progress
+from airlight.validation.clock import time_repeated
+from airlight.validation.estimates.images import Budget, monte_carlo_reference
+from airlight.validation.papers.claims import INTERVAL, Figure, quartiles
+from airlight.validation.scenes.loading import LoadedScene, load_scene, resize
+from airlight.validation.scenes.parts import fog, medium_boundary, sun, tabulated_phase
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.statistics.samples import LEVEL, student_quantile
+from airlight.validation.study.frame_times import first_frame
+from airlight.validation.timing import Timing
 
 SIZE, SAMPLES = (80, 60), 512
 _FEWER = 4  #: times as few in Fig. 11, of which means over pixels are compared

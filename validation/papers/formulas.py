@@ -15,14 +15,14 @@ from functools import partial
 import numpy as np
 from scipy.integrate import quad
 
-from analytic.droplets import Modified, optics
-from analytic.phase import PhaseFunction
-from analytic.series import taylor_coefficients
-from realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
-from validation.arrays import Array, Bools
-from validation.kernels.case_files import Cases
-from validation.kernels.cases import evaluate_cases, relative_error
-from validation.kernels.rays import wide_rays
+from airlight.analytic.droplets import Modified, optics
+from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.series import taylor_coefficients
+from airlight.realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.kernels.case_files import Cases
+from airlight.validation.kernels.cases import evaluate_cases, relative_error
+from airlight.validation.kernels.rays import wide_rays
 
 _RAYS, _WIDE_RAYS = 48, 1 << 13
 _HAZY = PhaseFunction("hazy")

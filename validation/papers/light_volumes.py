@@ -22,28 +22,35 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.geometry import foot_and_height
-from analytic.panels import airlight_segments
-from analytic.phase import PhaseFunction
-from realtime.frame.renderer import FrameRenderer, evaluated, image_frame, render_frame, run_cast_and_shade, run_method
-from realtime.methods.light_volumes.published.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
-from realtime.methods.light_volumes.published.raster import signed_crossings
-from realtime.methods.light_volumes.published.tessellation import divide, edges, quads, triangles
-from realtime.scene.lights import Light
-from realtime.scene.read_scene import Scene, read_scene
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
-from reference.scene.read import read_reference
-from validation.arrays import Array, Bools, Index
-from validation.clock import time_in_turns
-from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import error_metrics, known
-from validation.papers.claims import quartiles
-from validation.scenes.loading import load_scene, resize
-from validation.scenes.meshes import lathe, placed
-from validation.scenes.parts import mitsuba_mesh
-from validation.scenes.registry import SCENES
-from validation.study import configuration as methods
-from validation.study.frame_times import moved_light
+from airlight.analytic.geometry import foot_and_height
+from airlight.analytic.panels import airlight_segments
+from airlight.analytic.phase import PhaseFunction
+from airlight.realtime.frame.renderer import (
+    FrameRenderer,
+    evaluated,
+    image_frame,
+    render_frame,
+    run_cast_and_shade,
+    run_method,
+)
+from airlight.realtime.methods.light_volumes.published.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
+from airlight.realtime.methods.light_volumes.published.raster import signed_crossings
+from airlight.realtime.methods.light_volumes.published.tessellation import divide, edges, quads, triangles
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
+from airlight.reference.scene.read import read_reference
+from airlight.validation.arrays import Array, Bools, Index
+from airlight.validation.clock import time_in_turns
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.metrics.errors import error_metrics, known
+from airlight.validation.papers.claims import quartiles
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.scenes.meshes import lathe, placed
+from airlight.validation.scenes.parts import mitsuba_mesh
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.study import configuration as methods
+from airlight.validation.study.frame_times import moved_light
 
 MAP = 512  #: of the colonnade, six faces, and of the sphere [texels]
 SIZE = (160, 120)  #: of images [pixels]

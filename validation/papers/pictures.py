@@ -11,18 +11,18 @@ from dataclasses import replace
 import mitsuba as mi
 import numpy as np
 
-from realtime.frame.renderer import render_frame
-from realtime.methods.light_volumes.published.mesh import THRESHOLD
-from realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
-from realtime.scene.animate import thicker_medium
-from realtime.scene.read_scene import Scene, read_scene
-from realtime.shadow_maps.shadow_map import cast_shadow_map
-from validation.arrays import Array
-from validation.papers.light_volumes import corner_heights, plain_edges, quad_levels
-from validation.scenes.loading import load_scene, resize
-from validation.scenes.parts import point_light
-from validation.scenes.registry import SCENES
-from validation.study.configuration import configuration, prepared
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.methods.light_volumes.published.mesh import THRESHOLD
+from airlight.realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
+from airlight.realtime.scene.animate import thicker_medium
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
+from airlight.validation.arrays import Array
+from airlight.validation.papers.light_volumes import corner_heights, plain_edges, quad_levels
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.scenes.parts import point_light
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.study.configuration import configuration, prepared
 
 _FACE = 1  # of the six, the one that sees the columns
 

@@ -20,18 +20,18 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import Scene, read_scene
-from reference.monte_carlo.batches import LAYERS
-from validation.arrays import Array
-from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.metrics.errors import error_metrics, known
-from validation.papers.claims import INTERVAL, Figure
-from validation.scenes.loading import load_scene, resize
-from validation.scenes.parts import camera, fog, point_light
-from validation.scenes.registry import SCENES
-from validation.study.configuration import configuration, prepared
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.monte_carlo.batches import LAYERS
+from airlight.validation.arrays import Array
+from airlight.validation.estimates.monte_carlo import monte_carlo_batches
+from airlight.validation.estimates.multiple_scattering import multiple_scattering_fraction
+from airlight.validation.metrics.errors import error_metrics, known
+from airlight.validation.papers.claims import INTERVAL, Figure
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.scenes.parts import camera, fog, point_light
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.study.configuration import configuration, prepared
 
 _SCENES = ("open-fog", "two-pens", "colonnade")
 _SIZE = (32, 24)  # of the images of multiple scattering [pixels]

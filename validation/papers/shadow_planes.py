@@ -16,16 +16,16 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from analytic.geometry import foot_and_height
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import Scene, read_scene
-from reference.scene.read import read_reference
-from validation.arrays import Array, Bools
-from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import Metrics, error_metrics, known
-from validation.scenes.loading import load_scene, resize
-from validation.scenes.parts import camera, fog, point_light
-from validation.study.configuration import configuration, prepared
+from airlight.analytic.geometry import foot_and_height
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.metrics.errors import Metrics, error_metrics, known
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.scenes.parts import camera, fog, point_light
+from airlight.validation.study.configuration import configuration, prepared
 
 SIZE = (160, 120)  #: of the images [pixels]
 SCENES = ("two-pens", "clutter", "hall", "colonnade")  #: whose planes are ordered

@@ -15,16 +15,16 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from analytic.droplets import Modified, optics
-from realtime.clouds.canonical.coordinates import SETS, set_name
-from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.canonical.fit import fit_on_device, fitted_functions
-from realtime.clouds.canonical.transport_grid import Transport, canonical_transport, on_device
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
-from realtime.numerics.array_types import ArrayTypes, array_types
-from validation.arrays import Array
-from validation.slab.moments import DOWN, UP, SlabOrders, order_sets
-from validation.slab.phases import droplet_phase, phase_pair
+from airlight.analytic.droplets import Modified, optics
+from airlight.realtime.clouds.canonical.coordinates import SETS, set_name
+from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
+from airlight.realtime.clouds.canonical.fit import fit_on_device, fitted_functions
+from airlight.realtime.clouds.canonical.transport_grid import Transport, canonical_transport, on_device
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
+from airlight.realtime.numerics.array_types import ArrayTypes, array_types
+from airlight.validation.arrays import Array
+from airlight.validation.slab.moments import DOWN, UP, SlabOrders, order_sets
+from airlight.validation.slab.phases import droplet_phase, phase_pair
 
 THICKNESSES = (50.0, 100.0, 300.0, 1000.0)  #: [m]
 _SUNS = (0.0, 75.0)  # [degrees]

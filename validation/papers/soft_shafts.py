@@ -26,17 +26,17 @@ from typing import Any
 
 import numpy as np
 
-from realtime.frame.renderer import render_frame, run_cast_and_shade
-from realtime.scene.read_scene import Scene, read_scene
-from validation.arrays import Array, Bools
-from validation.clock import time_in_turns
-from validation.estimates.quadrature import reference_image
-from validation.papers.claims import INTERVAL, Figure, quartiles
-from validation.scenes.loading import load_scene
-from validation.statistics.samples import LEVEL, student_quantile
-from validation.study.configuration import SHARED_POINTS, Configuration, prepared
-from validation.study.frame_times import moved_light
-from validation.timing import Timing
+from airlight.realtime.frame.renderer import render_frame, run_cast_and_shade
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.clock import time_in_turns
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.papers.claims import INTERVAL, Figure, quartiles
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.statistics.samples import LEVEL, student_quantile
+from airlight.validation.study.configuration import SHARED_POINTS, Configuration, prepared
+from airlight.validation.study.frame_times import moved_light
+from airlight.validation.timing import Timing
 
 SCENE, SIZE = "fence", (200, 152)  #: of the frames [pixels]; the source prints none
 POINTS = 64

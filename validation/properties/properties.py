@@ -11,11 +11,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.scene.camera import read_camera, resized_camera
-from realtime.scene.phase import Phase
-from realtime.scene.read_scene import Scene
-from validation.arrays import Array
-from validation.properties.view import distance, light_places, lit_points, optical_depths
+from airlight.realtime.scene.camera import read_camera, resized_camera
+from airlight.realtime.scene.phase import Phase
+from airlight.realtime.scene.read_scene import Scene
+from airlight.validation.arrays import Array
+from airlight.validation.properties.view import distance, light_places, lit_points, optical_depths
 
 _GRID = (32, 24)  # rays across and down the image
 _STEPS = 8  # points on each ray

@@ -9,8 +9,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.scene.read_scene import Scene
-from validation.arrays import Array, Bools
+from airlight.realtime.scene.read_scene import Scene
+from airlight.validation.arrays import Array, Bools
 
 _BEFORE = 1e-3  # of its way a shadow ray leaves out at either end
 

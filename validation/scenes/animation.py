@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError
-from realtime.area_lights.shape import turned_area_light
-from realtime.scene.animate import (
+from airlight.analytic.errors import InputError
+from airlight.realtime.area_lights.shape import turned_area_light
+from airlight.realtime.scene.animate import (
     Objects,
     closed_shapes,
     coloured_area_light,
@@ -32,12 +32,12 @@ from realtime.scene.animate import (
     turned_objects,
     with_area_lights,
 )
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.mesh_adjacency import read_occluders
-from realtime.scene.read_scene import Scene
-from validation.arrays import Array
-from validation.scenes.meshes import rotation
-from validation.scenes.registry import MOVES, Animation
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.mesh_adjacency import read_occluders
+from airlight.realtime.scene.read_scene import Scene
+from airlight.validation.arrays import Array
+from airlight.validation.scenes.meshes import rotation
+from airlight.validation.scenes.registry import MOVES, Animation
 
 
 def parse_moves(text: str) -> tuple[str, ...]:

@@ -13,10 +13,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from realtime.errors import InputError as MeshError
-from realtime.numerics.array_types import aligned_array
-from realtime.scene.closed_mesh import (
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as MeshError
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.realtime.scene.closed_mesh import (
     FLAT,
     Bounds,
     ClosedMesh,
@@ -25,9 +25,9 @@ from realtime.scene.closed_mesh import (
     shape_number,
     winding_number,
 )
-from realtime.scene.mesh_adjacency import scene_of
-from reference.scene.shapes import distance_to_triangles
-from validation.arrays import Array, Index
+from airlight.realtime.scene.mesh_adjacency import scene_of
+from airlight.reference.scene.shapes import distance_to_triangles
+from airlight.validation.arrays import Array, Index
 
 Body = tuple[Bounds | None, ClosedMesh | None]  #: as `read_bounds` returns it
 _SIDE = 1e-6  # of the length of an edge, and of the weights of a corner: what lies nearer to an end only touches it

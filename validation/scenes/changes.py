@@ -27,12 +27,12 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError, named_values, nearest
-from reference.scene.transforms import matrix_of
-from reference.storage.scene_digest import description_digest, give_description
-from validation.arrays import Array
-from validation.scenes.height_fog import NUMBERS
-from validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
+from airlight.analytic.errors import InputError, named_values, nearest
+from airlight.reference.scene.transforms import matrix_of
+from airlight.reference.storage.scene_digest import description_digest, give_description
+from airlight.validation.arrays import Array
+from airlight.validation.scenes.height_fog import NUMBERS
+from airlight.validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
 
 Values = tuple[float, ...]
 _LIGHTS = {"intensity": "W/sr", "irradiance": "W/m^2", "radiance": "W/(m^2 sr)"}

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.scenes.meshes import Mesh, icosphere
+from airlight.validation.arrays import Array
+from airlight.validation.scenes.meshes import Mesh, icosphere
 
 _STEPS = 160  # of the search along a direction
 _BASE = 713.0  # height of the base of the cumulus [m]

@@ -31,8 +31,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.scene.transforms import matrix_of
-from validation.scenes.engine_fog import ENGINES, layers_of
+from airlight.reference.scene.transforms import matrix_of
+from airlight.validation.scenes.engine_fog import ENGINES, layers_of
 
 NUMBERS = ("sigma_0", "sigma_1", "z_1", "H_1", "sigma_2", "z_2", "H_2")
 _WIDE = 1000.0  # half of the least width over the height

@@ -16,8 +16,8 @@ t^5 - 15 t^4 + 10 t^3. It is continuous with its first two derivatives, 0 at the
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.arrays import Array, Bools, Index
-from validation.scenes.meshes import Mesh
+from airlight.validation.arrays import Array, Bools, Index
+from airlight.validation.scenes.meshes import Mesh
 
 NOISE_BOUND = 0.75**0.5  #: of one octave: half the diagonal of a cell, between its corners' planes
 SAMPLING = 11.0  #: between the points of a mesh of which the nearest is taken [m]

@@ -14,16 +14,16 @@ from typing import Any
 
 import mitsuba as mi
 
-from analytic.errors import InputError, nearest
-from reference.storage.code import source_digest
-from reference.storage.scene_digest import give_description, is_whole, scene_digest
-from validation.scenes.bodies import check_bodies
-from validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes
-from validation.scenes.height_fog import register_height_fog
-from validation.scenes.numbers import check_numbers
-from validation.scenes.random.design import FILE as RANGES
-from validation.scenes.random.design import PREFIX, is_random, random_parts, read_ranges
-from validation.scenes.registry import SCENES, Animation, SceneRecord
+from airlight.analytic.errors import InputError, nearest
+from airlight.reference.storage.code import source_digest
+from airlight.reference.storage.scene_digest import give_description, is_whole, scene_digest
+from airlight.validation.scenes.bodies import check_bodies
+from airlight.validation.scenes.changes import change_scene, isotropic_media, scene_with_lobes
+from airlight.validation.scenes.height_fog import register_height_fog
+from airlight.validation.scenes.numbers import check_numbers
+from airlight.validation.scenes.random.design import FILE as RANGES
+from airlight.validation.scenes.random.design import PREFIX, is_random, random_parts, read_ranges
+from airlight.validation.scenes.registry import SCENES, Animation, SceneRecord
 
 _LARGEST = 16384
 
@@ -60,7 +60,7 @@ def load_scene(
     if record is not None:
         built = mi.load_dict(record.build(), optimize=False)
         if record.digest and not is_whole(built):
-            give_description(built, f"{record.name} {source_digest('validation.scenes.registry')}")
+            give_description(built, f"{record.name} {source_digest('airlight.validation.scenes.registry')}")
         loaded = LoadedScene(record.name, built, record.purpose, record.published, animation=record.animation)
     else:
         path = _existing(name_or_path)
@@ -83,7 +83,7 @@ def find_record(name: str) -> SceneRecord | None:
     """Return the record of a built-in or random scene, None for what must be a path."""
     if not is_random(name):
         return SCENES.get(name)
-    from validation.scenes.random.scene import random_record
+    from airlight.validation.scenes.random.scene import random_record
 
     return random_record(name)
 
@@ -164,7 +164,7 @@ def _check_films(loaded: LoadedScene) -> None:
 
 
 def _read(path: Path, lobes: Mapping[str, float] = MappingProxyType({})):
-    from validation.scenes.files.read import read_file
+    from airlight.validation.scenes.files.read import read_file
 
     scene = read_file(path, lobes)
     if not isinstance(scene, mi.Scene):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from validation.arrays import Array, Index
+from airlight.validation.arrays import Array, Index
 
 Vertices = Array  #: (vertices, 3) [m]
 Faces = Index  #: (faces, 3), counter-clockwise as seen from outside

@@ -12,10 +12,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from realtime.errors import InputError as MethodError
-from realtime.scene.rounding import check_rounding
-from validation.arrays import Array
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as MethodError
+from airlight.realtime.scene.rounding import check_rounding
+from airlight.validation.arrays import Array
 
 LARGEST_LENGTH = 1e9  #: of a coordinate or a radius [m], also of an extinction [1/m]
 LARGEST_LIGHT = 1e18  #: of an intensity [W/sr] or an irradiance [W/m^2]

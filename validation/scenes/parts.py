@@ -7,10 +7,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from analytic.phase import phase_from_words
-from realtime.numerics.array_types import aligned_array
-from validation.scenes.meshes import Mesh
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import phase_from_words
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.validation.scenes.meshes import Mesh
 
 
 def mitsuba_mesh(name: str, mesh: Mesh, reflectance: Sequence[float]):

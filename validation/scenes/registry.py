@@ -40,10 +40,18 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from validation.scenes import cloud_meshes, meshes
-from validation.scenes.height_fog import register_height_fog
-from validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
-from validation.scenes.parts import camera, fog, height_fog, light, medium_boundary, mitsuba_mesh, phase_function
+from airlight.validation.scenes import cloud_meshes, meshes
+from airlight.validation.scenes.height_fog import register_height_fog
+from airlight.validation.scenes.meshes import Mesh, bent, joined, placed, rotation, scaled
+from airlight.validation.scenes.parts import (
+    camera,
+    fog,
+    height_fog,
+    light,
+    medium_boundary,
+    mitsuba_mesh,
+    phase_function,
+)
 
 MOVES = ("light", "objects", "medium", "colour")
 FILES = tuple(
@@ -193,7 +201,7 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
         return height_fog(table["layers"], table["floor"], table["cap"], albedo=table["albedo"], phase=phase)
     medium = fog(table["sigma_t"], table["albedo"], phase)
     if "smoke" in table:
-        from validation.scenes.smoke import smoke
+        from airlight.validation.scenes.smoke import smoke
 
         given = dict(table["smoke"])
         low, high = np.array(given.pop("low")), np.array(given.pop("high"))
@@ -209,7 +217,7 @@ def _medium(table: Table, shape: str = "") -> dict[str, Any]:
 
 @cache
 def _density(mesh: str, given: str) -> Any:
-    from validation.scenes.hypertexture import hypertexture
+    from airlight.validation.scenes.hypertexture import hypertexture
 
     return hypertexture(MESHES[mesh](), **json.loads(given))
 

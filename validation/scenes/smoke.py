@@ -12,8 +12,8 @@ and ends smoothly below its top. The numbers depend on nothing but the arguments
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.arrays import Array
-from validation.scenes.hypertexture import grid_points, octaves, sigmoid
+from airlight.validation.arrays import Array
+from airlight.validation.scenes.hypertexture import grid_points, octaves, sigmoid
 
 
 def smoke(

@@ -27,14 +27,14 @@ from typing import Any
 
 import numpy as np
 
-from realtime.clouds.slab_orders.phases import SlabPhase
-from reference.monte_carlo.slab_walk.estimates import SlabEstimate, slab_estimate
-from reference.monte_carlo.slab_walk.walk import Slab
-from validation.arrays import Array, Progress
-from validation.columns import plain
-from validation.slab.moments import DOWN, FLUENCE, UP, SlabOrders, order_sets
-from validation.slab.radiance import slab_radiance
-from validation.slab.request import SlabRequest
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.reference.monte_carlo.slab_walk.estimates import SlabEstimate, slab_estimate
+from airlight.reference.monte_carlo.slab_walk.walk import Slab
+from airlight.validation.arrays import Array, Progress
+from airlight.validation.columns import plain
+from airlight.validation.slab.moments import DOWN, FLUENCE, UP, SlabOrders, order_sets
+from airlight.validation.slab.radiance import slab_radiance
+from airlight.validation.slab.request import SlabRequest
 
 Exit = tuple[float | None, float | None, float | None]  # light through a plane: amount, mean and rms displacement
 

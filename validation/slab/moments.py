@@ -35,10 +35,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
-from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
-from realtime.clouds.slab_orders.phases import SlabPhase
-from validation.arrays import Array
+from airlight.realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.validation.arrays import Array
 
 #: Places of the fields of one order at the nodes, (5, Z, 2 N + 1), the beam last.
 B0, B1, A0, A1, C0 = range(5)

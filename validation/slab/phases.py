@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from analytic.droplets import Modified
-from analytic.errors import InputError
-from analytic.phase import PhaseFunction, phase_from_words
-from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SlabPhase
-from realtime.droplets import CUT, droplet_series
-from realtime.scene.phase import HgDraine
-from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
-from reference.monte_carlo.slab_walk.walk import Scattering
-from validation.arrays import Array
-from validation.readers import read_csv
+from airlight.analytic.droplets import Modified
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SlabPhase
+from airlight.realtime.droplets import CUT, droplet_series
+from airlight.realtime.scene.phase import HgDraine
+from airlight.reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
+from airlight.reference.monte_carlo.slab_walk.walk import Scattering
+from airlight.validation.arrays import Array
+from airlight.validation.readers import read_csv
 
 #: |g| up to which the streams resolve Henyey and Greenstein's lobe
 LARGEST_G = 0.98

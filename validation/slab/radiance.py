@@ -18,10 +18,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
-from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
-from realtime.clouds.slab_orders.phases import SlabPhase
-from validation.arrays import Array
+from airlight.realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, Streams, double_gauss, mode_kernel
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.validation.arrays import Array
 
 #: A mode below this fraction of the source, twice in a row, ends the sum over modes.
 _NEGLIGIBLE = 1e-10

@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analytic.errors import InputError
-from validation.slab.phases import PhasePair, phase_pair
+from airlight.analytic.errors import InputError
+from airlight.validation.slab.phases import PhasePair, phase_pair
 
 #: The sets of orders of Bouthors 2008, section 5.1; order 1 stands apart.
 SETS = ("1", "2", "3-4", "5-6", "7-8", "9-12", "13-18", "19-30", "31-inf")

@@ -64,12 +64,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analytic.errors import InputError
-from validation.arrays import Array, Bools
-from validation.columns import record_of
-from validation.metrics.errors import compared
-from validation.statistics.records import Statistics
-from validation.statistics.samples import (
+from airlight.analytic.errors import InputError
+from airlight.validation.arrays import Array, Bools
+from airlight.validation.columns import record_of
+from airlight.validation.metrics.errors import compared
+from airlight.validation.statistics.records import Statistics
+from airlight.validation.statistics.samples import (
     binomial_p,
     bonferroni,
     satterthwaite,

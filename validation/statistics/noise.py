@@ -63,9 +63,9 @@ from typing import Any
 
 import numpy as np
 
-from validation.statistics.comparison import LEVEL
-from validation.statistics.estimate import Answer, Estimate
-from validation.statistics.samples import sidak
+from airlight.validation.statistics.comparison import LEVEL
+from airlight.validation.statistics.estimate import Answer, Estimate
+from airlight.validation.statistics.samples import sidak
 
 ROUNDING = 2.0**-24  #: half of the distance from 1 to the next float32
 ERROR_TOLERANCE = 0.02  #: relative band of an error

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from validation.columns import column
+from airlight.validation.columns import column
 
 Number = float | None
 Ends = tuple[Number, Number]  #: of an interval

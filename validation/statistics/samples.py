@@ -15,8 +15,8 @@ import scipy
 from numpy.typing import ArrayLike
 from scipy.special import ndtri, stdtr, stdtrit
 
-from validation.arrays import Array
-from validation.statistics.estimate import INTERVAL, Estimate
+from airlight.validation.arrays import Array
+from airlight.validation.statistics.estimate import INTERVAL, Estimate
 
 LEVEL = 0.95  #: with at least this probability an interval holds what it estimates
 LEAST = 8  #: values of a series of which the mean has an error: of fewer, r says nothing of phi (see `mean_of_series`)

@@ -24,13 +24,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from realtime.methods.interface.method import method_parameters
-from realtime.methods.registry import find_method
-from realtime.parameters import values
-from realtime.scene.read_scene import Scene
-from validation.arrays import Array
-from validation.columns import column
-from validation.study.configuration import Configuration
+from airlight.realtime.methods.interface.method import method_parameters
+from airlight.realtime.methods.registry import find_method
+from airlight.realtime.parameters import values
+from airlight.realtime.scene.read_scene import Scene
+from airlight.validation.arrays import Array
+from airlight.validation.columns import column
+from airlight.validation.study.configuration import Configuration
 
 REST, POINTS = "rest", "light samples"
 

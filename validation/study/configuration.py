@@ -13,19 +13,19 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError, named_values, nearest
-from realtime.errors import InputError as MethodError
-from realtime.frame.renderer import FrameRenderer, frame_renderer
-from realtime.kernels.registry import KERNELS, Kernel
-from realtime.methods.interface.method import method_parameters
-from realtime.methods.registry import find_method
-from realtime.methods.shader.source import is_shader, is_users, read_shader
-from realtime.methods.user_method import method_file, user_errors, user_object
-from realtime.parameters import values
-from realtime.scene.read_scene import Scene
-from reference.storage.code import code_digest
-from reference.storage.store import Content
-from validation.study.cost import TIMED, Work, frame_work
+from airlight.analytic.errors import InputError, named_values, nearest
+from airlight.realtime.errors import InputError as MethodError
+from airlight.realtime.frame.renderer import FrameRenderer, frame_renderer
+from airlight.realtime.kernels.registry import KERNELS, Kernel
+from airlight.realtime.methods.interface.method import method_parameters
+from airlight.realtime.methods.registry import find_method
+from airlight.realtime.methods.shader.source import is_shader, is_users, read_shader
+from airlight.realtime.methods.user_method import method_file, user_errors, user_object
+from airlight.realtime.parameters import values
+from airlight.realtime.scene.read_scene import Scene
+from airlight.reference.storage.code import code_digest
+from airlight.reference.storage.store import Content
+from airlight.validation.study.cost import TIMED, Work, frame_work
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
 def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:
     """Return the frame renderer of a configuration for a scene; `extra_layers` as of `frame_renderer`.
 
-    Raises `realtime.errors.InputError` if the method refuses.
+    Raises `airlight.realtime.errors.InputError` if the method refuses.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     parameters: dict[str, Any] = dict(chosen.parameters)

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from analytic.errors import InputError
-from realtime.memory import usable_memory
-from reference.quadrature.image import light_samples_of_ray, rays_of_pixel
+from airlight.analytic.errors import InputError
+from airlight.realtime.memory import usable_memory
+from airlight.reference.quadrature.image import light_samples_of_ray, rays_of_pixel
 
 LONGEST = 3600.0  #: seconds that a command may take at least without being forced
 _NOTED = 60.0  # seconds from which on a user would rather know before than wait

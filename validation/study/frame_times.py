@@ -13,10 +13,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.clock import Spent
-from realtime.frame.incremental import FrameCache, next_frame, next_parts
-from realtime.frame.light_on_ray import check_radiance
-from realtime.frame.renderer import (
+from airlight.analytic.clock import Spent
+from airlight.realtime.frame.incremental import FrameCache, next_frame, next_parts
+from airlight.realtime.frame.light_on_ray import check_radiance
+from airlight.realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
     frame_with_part,
@@ -26,15 +26,15 @@ from realtime.frame.renderer import (
     run_shade,
     run_stages,
 )
-from realtime.frame.surface import cast_rays
-from realtime.methods.shader.method import drawn_again
-from realtime.numerics.array_types import aligned_array
-from realtime.numerics.recorded import Frozen
-from realtime.scene.animate import Objects, read_objects, turned_objects
-from realtime.scene.camera import ray_directions, tiled_pixels
-from realtime.scene.read_scene import Scene
-from validation.clock import timed, timing_of
-from validation.timing import FrameTimes, TimingRun
+from airlight.realtime.frame.surface import cast_rays
+from airlight.realtime.methods.shader.method import drawn_again
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.scene.animate import Objects, read_objects, turned_objects
+from airlight.realtime.scene.camera import ray_directions, tiled_pixels
+from airlight.realtime.scene.read_scene import Scene
+from airlight.validation.clock import timed, timing_of
+from airlight.validation.timing import FrameTimes, TimingRun
 
 _BRIEF_SLOW = 500.0  # of a slower frame the airlight is not timed by itself where times are brief [ms]
 

@@ -45,23 +45,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import linregress
 
-from analytic.errors import InputError
-from realtime.scene.animate import turned_light
-from realtime.scene.lights import Light
-from realtime.scene.mesh_adjacency import mesh_triangles, scene_of
-from realtime.scene.read_scene import Scene, read_scene
-from validation.arrays import Array, Counted
-from validation.clock import time_repeated
-from validation.columns import record_of
-from validation.scenes.loading import load_scene
-from validation.scenes.meshes import divided, rotation
-from validation.scenes.parts import mesh_with_material
-from validation.study.frame_times import camera_rays
-from validation.study.row import Growth, Row
-from validation.study.run import run, with_times
-from validation.study.study import GROWTH, Cell, Study
-from validation.study.turns import time_cells
-from validation.timing import Scaling, TimeGrowth, TimingRun, joined
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.animate import turned_light
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.mesh_adjacency import mesh_triangles, scene_of
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.validation.arrays import Array, Counted
+from airlight.validation.clock import time_repeated
+from airlight.validation.columns import record_of
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.meshes import divided, rotation
+from airlight.validation.scenes.parts import mesh_with_material
+from airlight.validation.study.frame_times import camera_rays
+from airlight.validation.study.row import Growth, Row
+from airlight.validation.study.run import run, with_times
+from airlight.validation.study.study import GROWTH, Cell, Study
+from airlight.validation.study.turns import time_cells
+from airlight.validation.timing import Scaling, TimeGrowth, TimingRun, joined
 
 TIMES = ("frame", "light_moved", "objects_moved")
 CLIFF = 0.6  #: steeper than the exponent by so much: 4 times the work then takes 2.3 times as long as it may

@@ -7,16 +7,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 
-from reference.storage.code import source_digest
-from reference.storage.store import Content, Inputs
-from validation.properties.properties import scene_properties
-from validation.scenes.loading import scene_identity
-from validation.scenes.random.design import is_random
-from validation.scenes.registry import SCENES
-from validation.study.configuration import Configuration, user_code
-from validation.study.reference import cell_reference
-from validation.study.run import run
-from validation.study.study import Cell, Measure
+from airlight.reference.storage.code import source_digest
+from airlight.reference.storage.store import Content, Inputs
+from airlight.validation.properties.properties import scene_properties
+from airlight.validation.scenes.loading import scene_identity
+from airlight.validation.scenes.random.design import is_random
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.study.configuration import Configuration, user_code
+from airlight.validation.study.reference import cell_reference
+from airlight.validation.study.run import run
+from airlight.validation.study.study import Cell, Measure
 
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
 
@@ -69,7 +69,7 @@ class RowInputs(Inputs):
     """The inputs of a row of a sweep."""
 
     kind = "row"
-    modules = ("validation.study.keys",)
+    modules = ("airlight.validation.study.keys",)
     reference: CellReference
     chosen: Configuration
     code: tuple[Content, ...]  #: of the user's in the configuration

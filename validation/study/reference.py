@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.clock import Spent
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import PointPlan
-from reference.storage.scene_digest import scene_content
-from reference.storage.store import Content, Inputs, stored
-from validation.arrays import Array
-from validation.estimates.quadrature import reference_of_pixels, reference_result
-from validation.metrics.errors import FLOOR
-from validation.scenes.changes import parse_changes
-from validation.scenes.loading import LoadedScene, load_scene
-from validation.study.row import ReferenceError
-from validation.study.study import Cell
+from airlight.analytic.clock import Spent
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.storage.scene_digest import scene_content
+from airlight.reference.storage.store import Content, Inputs, stored
+from airlight.validation.arrays import Array
+from airlight.validation.estimates.quadrature import reference_of_pixels, reference_result
+from airlight.validation.metrics.errors import FLOOR
+from airlight.validation.scenes.changes import parse_changes
+from airlight.validation.scenes.loading import LoadedScene, load_scene
+from airlight.validation.study.row import ReferenceError
+from airlight.validation.study.study import Cell
 
 # Points of area lights: a ray has enough at a standard error of 2 %, and has never more than 8 times 4. Each
 # point takes as long as a point light does, and surfaces take as long again: these are left out.

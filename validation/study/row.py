@@ -14,12 +14,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from validation.columns import Column, column, columns_of, plain, shown_values
-from validation.metrics.colour import ColourDifference
-from validation.metrics.errors import RADIANCE, Metrics, RunsError
-from validation.metrics.flip import Flip
-from validation.metrics.other_tools import PublishedErrors
-from validation.timing import FrameTimes, Timing
+from airlight.validation.columns import Column, column, columns_of, plain, shown_values
+from airlight.validation.metrics.colour import ColourDifference
+from airlight.validation.metrics.errors import RADIANCE, Metrics, RunsError
+from airlight.validation.metrics.flip import Flip
+from airlight.validation.metrics.other_tools import PublishedErrors
+from airlight.validation.timing import FrameTimes, Timing
 
 #: Outcomes of a cell. 'done': numbers; 'refused': the method, or the reference, says that it cannot do this scene, and
 #: `reason` why; 'left out': a frame would take too long; 'failed': an exception; 'hung': stopped at the time limit;

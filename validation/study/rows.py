@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError
-from reference.storage.files import atomic_path, ensure_folder
-from validation.study.row import COLUMNS, arrow_schema, property_names
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.files import atomic_path, ensure_folder
+from airlight.validation.study.row import COLUMNS, arrow_schema, property_names
 
 ROWS, PARQUET, JSON = "rows.sqlite", "sweep.parquet", "sweep.jsonl"  #: files of the folder of a study
 

@@ -21,28 +21,35 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.clock import stopwatch
-from realtime.errors import InputError
-from realtime.frame.renderer import Frame, FrameRenderer, light_groups, render_frame, run_stages, unchecked_frame
-from realtime.methods.interface.method import method_parameters
-from realtime.methods.registry import find_method
-from realtime.methods.shader.source import is_shader
-from realtime.scene.read_scene import Scene, read_scene
-from reference.storage.exr import Image
-from validation.clock import timed
-from validation.metrics.colour import colour_difference
-from validation.metrics.errors import FLOOR, error_metrics
-from validation.metrics.flip import flip_hdr
-from validation.metrics.other_tools import published_errors
-from validation.motion.blocks import parts_of_error
-from validation.statistics.estimate import Answer
-from validation.statistics.samples import first_equal, student
-from validation.study.configuration import Configuration, prepared, rendered_lights
-from validation.study.reference import Reference, load_cell
-from validation.study.row import Cost, Growth, Row, RunsError, StatedError
-from validation.study.stated_errors import stated_bound, worth_of_ends
-from validation.study.study import Cell, map_side, seed_of
-from validation.study.turns import REFUSALS, Apart, CellTimes, brief_times
+from airlight.analytic.clock import stopwatch
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import (
+    Frame,
+    FrameRenderer,
+    light_groups,
+    render_frame,
+    run_stages,
+    unchecked_frame,
+)
+from airlight.realtime.methods.interface.method import method_parameters
+from airlight.realtime.methods.registry import find_method
+from airlight.realtime.methods.shader.source import is_shader
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.storage.exr import Image
+from airlight.validation.clock import timed
+from airlight.validation.metrics.colour import colour_difference
+from airlight.validation.metrics.errors import FLOOR, error_metrics
+from airlight.validation.metrics.flip import flip_hdr
+from airlight.validation.metrics.other_tools import published_errors
+from airlight.validation.motion.blocks import parts_of_error
+from airlight.validation.statistics.estimate import Answer
+from airlight.validation.statistics.samples import first_equal, student
+from airlight.validation.study.configuration import Configuration, prepared, rendered_lights
+from airlight.validation.study.reference import Reference, load_cell
+from airlight.validation.study.row import Cost, Growth, Row, RunsError, StatedError
+from airlight.validation.study.stated_errors import stated_bound, worth_of_ends
+from airlight.validation.study.study import Cell, map_side, seed_of
+from airlight.validation.study.turns import REFUSALS, Apart, CellTimes, brief_times
 
 Array = NDArray[np.float64]
 #: Makes a picture of reference and image, both (height, width, 3) [W/(m^2 sr)]; None where there is none.

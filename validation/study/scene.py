@@ -19,32 +19,37 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.clock import Spent
-from realtime.scene.read_scene import Scene, SceneFeatures, read_scene
-from reference.quadrature.ray_values import ReferenceImage
-from reference.storage.exr import TOTAL, Image
-from reference.storage.scene_digest import scene_content, scene_digest
-from reference.storage.store import Content, Inputs, Kept, is_kept, stored
-from validation.arrays import Array
-from validation.columns import record_of
-from validation.estimates.agreement import agreements
-from validation.estimates.monte_carlo import ElsewhereFor
-from validation.estimates.multiple_scattering import multiple_scattering_fraction
-from validation.estimates.quadrature import ReferenceInputs, reference_image, reference_inputs, reference_result
-from validation.metrics.flip import Flip, flip_hdr
-from validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
-from validation.statistics.records import Agreement, MultipleScattering
-from validation.study.configuration import Configuration, configuration_work, user_code
-from validation.study.cost import Work, reference_work, sampled_work
-from validation.study.reference import of_image
-from validation.study.row import Row
-from validation.study.run import cell_row, layered_frame, run, with_times
-from validation.study.study import Cell, Checks, Study
-from validation.study.turns import Apart, CellTimes, time_cells
-from validation.timing import FrameTimes, Timing
+from airlight.analytic.clock import Spent
+from airlight.realtime.scene.read_scene import Scene, SceneFeatures, read_scene
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.storage.exr import TOTAL, Image
+from airlight.reference.storage.scene_digest import scene_content, scene_digest
+from airlight.reference.storage.store import Content, Inputs, Kept, is_kept, stored
+from airlight.validation.arrays import Array
+from airlight.validation.columns import record_of
+from airlight.validation.estimates.agreement import agreements
+from airlight.validation.estimates.monte_carlo import ElsewhereFor
+from airlight.validation.estimates.multiple_scattering import multiple_scattering_fraction
+from airlight.validation.estimates.quadrature import (
+    ReferenceInputs,
+    reference_image,
+    reference_inputs,
+    reference_result,
+)
+from airlight.validation.metrics.flip import Flip, flip_hdr
+from airlight.validation.scenes.loading import LoadedScene, load_scene, resize, scene_identity
+from airlight.validation.statistics.records import Agreement, MultipleScattering
+from airlight.validation.study.configuration import Configuration, configuration_work, user_code
+from airlight.validation.study.cost import Work, reference_work, sampled_work
+from airlight.validation.study.reference import of_image
+from airlight.validation.study.row import Row
+from airlight.validation.study.run import cell_row, layered_frame, run, with_times
+from airlight.validation.study.study import Cell, Checks, Study
+from airlight.validation.study.turns import Apart, CellTimes, time_cells
+from airlight.validation.timing import FrameTimes, Timing
 
 if TYPE_CHECKING:  # what only reports of images need is imported there
-    from validation.engine.images import EngineImage
+    from airlight.validation.engine.images import EngineImage
 
 Layer = NDArray[np.floating]  # frames are float32
 
@@ -451,7 +456,7 @@ def _with_flip(judged: Judged) -> Judged:
 
 def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
     """Return the row of an image from elsewhere."""
-    from validation.engine.images import image_times
+    from airlight.validation.engine.images import image_times
 
     times = image_times(shown.path)
     inputs = ImageInputs(study.reference_inputs, study.identity, study.size, shown.label, shown.path, times)
@@ -462,7 +467,7 @@ def _image(study: SceneStudy, shown: "EngineImage") -> Judged:
 
 def _measured_image(study: SceneStudy, shown: "EngineImage", times: tuple[Timing, str] | None) -> Judged:
     """Return the row of an image with its layers."""
-    from validation.engine.images import measure_image, notes_of
+    from airlight.validation.engine.images import measure_image, notes_of
 
     judged, layers, surface = measure_image(
         shown, study.loaded, study.reference_of, surfaces=study.scene.features.surfaces

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from validation.columns import column
+from airlight.validation.columns import column
 
 Size = tuple[int, int]  #: width and height [pixels]
 

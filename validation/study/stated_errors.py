@@ -29,19 +29,25 @@ from typing import Any
 
 import numpy as np
 
-from realtime.methods.registry import METHODS
-from realtime.parameters import defaults
-from realtime.scene.phase import Tabulated
-from realtime.scene.read_scene import Scene
-from reference.quadrature.fields import optical_depth
-from reference.quadrature.segments import AMBIENT, camera_segments, scattering_range
-from reference.quadrature.surface import surface_hits
-from reference.scene.convex_bounds import normals_at
-from reference.scene.directional_light import DirectionalLight
-from reference.scene.read import ReferenceLight, ReferenceMedium, ReferenceScene, homogeneous_around, read_reference
-from reference.visibility.distances import crossings
-from validation.arrays import Array, Index
-from validation.study.configuration import Configuration
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.parameters import defaults
+from airlight.realtime.scene.phase import Tabulated
+from airlight.realtime.scene.read_scene import Scene
+from airlight.reference.quadrature.fields import optical_depth
+from airlight.reference.quadrature.segments import AMBIENT, camera_segments, scattering_range
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.convex_bounds import normals_at
+from airlight.reference.scene.directional_light import DirectionalLight
+from airlight.reference.scene.read import (
+    ReferenceLight,
+    ReferenceMedium,
+    ReferenceScene,
+    homogeneous_around,
+    read_reference,
+)
+from airlight.reference.visibility.distances import crossings
+from airlight.validation.arrays import Array, Index
+from airlight.validation.study.configuration import Configuration
 
 #: The error of the integral that methods promise which claim to be exact, relative to the pixel, or to a thousandth of
 #: the mean in the dark: twice the error of their rules in bounded media.

@@ -34,10 +34,10 @@ from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from analytic.errors import InputError, nearest
-from realtime.methods.registry import FOG_METHODS, METHODS
-from realtime.parameters import defaults
-from validation.readers import (
+from airlight.analytic.errors import InputError, nearest
+from airlight.realtime.methods.registry import FOG_METHODS, METHODS
+from airlight.realtime.parameters import defaults
+from airlight.validation.readers import (
     Reader,
     by_name,
     each_once,
@@ -50,11 +50,11 @@ from validation.readers import (
     read_word,
     several,
 )
-from validation.scenes.changes import change_words
-from validation.scenes.loading import parse_size
-from validation.scenes.random.design import PREFIX, is_random, random_name, read_ranges
-from validation.scenes.registry import FOG_SCENES, SCENES
-from validation.study.configuration import (
+from airlight.validation.scenes.changes import change_words
+from airlight.validation.scenes.loading import parse_size
+from airlight.validation.scenes.random.design import PREFIX, is_random, random_name, read_ranges
+from airlight.validation.scenes.registry import FOG_SCENES, SCENES
+from airlight.validation.study.configuration import (
     QUICK,
     Configuration,
     chosen_configurations,
@@ -62,7 +62,7 @@ from validation.study.configuration import (
     find_kernel,
     named_configurations,
 )
-from validation.study.settings import Checks, Measure, Settings
+from airlight.validation.study.settings import Checks, Measure, Settings
 
 #: How frames are timed: 'none'; 'with' the computation of errors, briefly, whatever else runs on the host; 'alone',
 #: where nothing else of the study runs there; 'stages': all stages, and frames after light, objects or colours changed.

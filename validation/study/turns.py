@@ -18,16 +18,16 @@ from typing import Any
 
 import numpy as np
 
-from analytic.clock import Spent
-from analytic.errors import InputError as ReferenceInputError
-from realtime.errors import InputError
-from realtime.frame.renderer import FrameRenderer, parts, render_frame
-from realtime.methods.shader.source import is_shader
-from realtime.scene.read_scene import Scene, read_scene
-from reference.storage.store import date
-from validation.clock import ROUNDS, Piece, in_turns, peak_memory, timed, timing_of
-from validation.study.configuration import prepared
-from validation.study.frame_times import (
+from airlight.analytic.clock import Spent
+from airlight.analytic.errors import InputError as ReferenceInputError
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import FrameRenderer, parts, render_frame
+from airlight.realtime.methods.shader.source import is_shader
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.reference.storage.store import date
+from airlight.validation.clock import ROUNDS, Piece, in_turns, peak_memory, timed, timing_of
+from airlight.validation.study.configuration import prepared
+from airlight.validation.study.frame_times import (
     FrameSpent,
     Turn,
     brief_turn,
@@ -38,9 +38,9 @@ from validation.study.frame_times import (
     times_of,
     whole_turn,
 )
-from validation.study.reference import load_cell
-from validation.study.study import Cell, Measure
-from validation.timing import ANCHORS, FrameTimes, TimingRun, anchored
+from airlight.validation.study.reference import load_cell
+from airlight.validation.study.study import Cell, Measure
+from airlight.validation.timing import ANCHORS, FrameTimes, TimingRun, anchored
 
 #: Calls a function with arguments in another process: ``apart(function, *arguments, name=the method's)``. Values
 #: that a function yields are yielded here, as they are asked for.

@@ -18,21 +18,21 @@ from typing import Any
 
 import numpy as np
 
-from analytic.errors import InputError
-from realtime.frame.renderer import FrameRenderer, render_frame
-from realtime.scene.read_scene import Scene, read_scene
-from validation.arrays import Array, Counted
-from validation.clock import Piece, in_turns
-from validation.estimates.quadrature import reference_image
-from validation.motion.judge import motion_verdict
-from validation.motion.measures import Measures, mean_measures, measure
-from validation.motion.measures import Sequence as Frames
-from validation.motion.noise import Noise, measure_noise
-from validation.scenes.animation import animate, frame_changes
-from validation.scenes.changes import change_scene
-from validation.scenes.registry import Animation
-from validation.study.configuration import Configuration, prepared
-from validation.study.frame_times import Turn, brief_turn, timed_image
+from airlight.analytic.errors import InputError
+from airlight.realtime.frame.renderer import FrameRenderer, render_frame
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.validation.arrays import Array, Counted
+from airlight.validation.clock import Piece, in_turns
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.motion.judge import motion_verdict
+from airlight.validation.motion.measures import Measures, mean_measures, measure
+from airlight.validation.motion.measures import Sequence as Frames
+from airlight.validation.motion.noise import Noise, measure_noise
+from airlight.validation.scenes.animation import animate, frame_changes
+from airlight.validation.scenes.changes import change_scene
+from airlight.validation.scenes.registry import Animation
+from airlight.validation.study.configuration import Configuration, prepared
+from airlight.validation.study.frame_times import Turn, brief_turn, timed_image
 
 _SECONDS = 0.2  # for the times of a method [s]
 _SURE = 2.0  # standard errors, below which the mean of the runs is not told from the reference

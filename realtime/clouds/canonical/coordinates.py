@@ -41,11 +41,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.slab_orders.phases import AnglePhase, SlabPhase
-from realtime.droplets import CUT
-from realtime.numerics.array_types import ArrayTypes
-from realtime.numerics.functions import cell_of
-from realtime.scene.phase import Phase
+from airlight.realtime.clouds.slab_orders.phases import AnglePhase, SlabPhase
+from airlight.realtime.droplets import CUT
+from airlight.realtime.numerics.array_types import ArrayTypes
+from airlight.realtime.numerics.functions import cell_of
+from airlight.realtime.scene.phase import Phase
 
 #: First and last order of each set.
 SETS: tuple[tuple[int, float], ...] = (

@@ -35,10 +35,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realtime.clouds.canonical.coordinates import SETS
-from realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
-from realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
-from realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.realtime.clouds.canonical.coordinates import SETS
+from airlight.realtime.clouds.slab_orders.depth_panels import DepthPanels, Transport, depth_panels
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import Eigenmodes, double_gauss, mode_kernel
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[Any]  # float32 or float64
 

@@ -25,13 +25,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.coordinates import SETS
-from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
-from realtime.clouds.canonical.transport_grid import Transport, logged, transport_digest
-from realtime.clouds.slab_orders.phases import SlabPhase
-from realtime.numerics.array_types import ArrayTypes
-from realtime.numerics.functions import between_entries
+from airlight.realtime.clouds.canonical import coordinates
+from airlight.realtime.clouds.canonical.coordinates import SETS
+from airlight.realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
+from airlight.realtime.clouds.canonical.transport_grid import Transport, logged, transport_digest
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.realtime.numerics.array_types import ArrayTypes
+from airlight.realtime.numerics.functions import between_entries
 
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]

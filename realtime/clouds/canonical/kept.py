@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
 
 Array = NDArray[Any]
 

@@ -38,14 +38,21 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.coordinates import ENTRIES, SETS, around, at_angle, place_fractions, repeated_scattering
-from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
-from realtime.clouds.slab_orders.phases import SlabPhase
-from realtime.errors import InputError
-from realtime.numerics.array_types import ArrayTypes, four_numbers
-from realtime.numerics.functions import between_entries
+from airlight.realtime.clouds.canonical import coordinates
+from airlight.realtime.clouds.canonical.coordinates import (
+    ENTRIES,
+    SETS,
+    around,
+    at_angle,
+    place_fractions,
+    repeated_scattering,
+)
+from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
+from airlight.realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
+from airlight.realtime.clouds.slab_orders.phases import SlabPhase
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import ArrayTypes, four_numbers
+from airlight.realtime.numerics.functions import between_entries
 
 Array = NDArray[Any]
 Progress = Callable[[float, str], None]

@@ -48,7 +48,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from realtime.clouds.slab_orders.depth_panels import Transport
+from airlight.realtime.clouds.slab_orders.depth_panels import Transport
 
 Array = NDArray[np.float64]
 

@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 import drjit as dr
 import mitsuba as mi
 
-from realtime.memory import check_memory
-from realtime.methods.epipolar.min_max_tree import SliceHeights, slice_heights
-from realtime.methods.epipolar.samples import (
+from airlight.realtime.memory import check_memory
+from airlight.realtime.methods.epipolar.min_max_tree import SliceHeights, slice_heights
+from airlight.realtime.methods.epipolar.samples import (
     STEPS,
     WORD,
     Samples,
@@ -34,22 +34,22 @@ from realtime.methods.epipolar.samples import (
     sample_ray,
     spread,
 )
-from realtime.methods.epipolar.slices import (
+from airlight.realtime.methods.epipolar.slices import (
     Slices,
     image_slices,
     neighbour,
     pixel_number,
     slice_coordinate,
 )
-from realtime.methods.epipolar.walk import sum_lit_intervals
-from realtime.methods.interface.method import Method, View
-from realtime.numerics.array_types import PerMetre, bytes_of
-from realtime.parameters import parameter
-from realtime.scene.camera import Camera
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import LitRays
-from realtime.shadow_maps.projection import light_faces
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth, map_memory, map_size
+from airlight.realtime.methods.epipolar.walk import sum_lit_intervals
+from airlight.realtime.methods.interface.method import Method, View
+from airlight.realtime.numerics.array_types import PerMetre, bytes_of
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.camera import Camera
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import LitRays
+from airlight.realtime.shadow_maps.projection import light_faces
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth, map_memory, map_size
 
 _MOST = 65536  # slices, and samples of a slice
 

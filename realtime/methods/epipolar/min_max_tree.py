@@ -23,11 +23,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.epipolar.slices import Slices
-from realtime.numerics.array_types import two_numbers
-from realtime.scene.lights import Light
-from realtime.shadow_maps.projection import cube_coordinates, light_faces
-from realtime.shadow_maps.shadow_map import ShadowMap
+from airlight.realtime.methods.epipolar.slices import Slices
+from airlight.realtime.numerics.array_types import two_numbers
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.projection import cube_coordinates, light_faces
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.epipolar.slices import Slices, neighbour, pixel_number, slice_coordinate
-from realtime.numerics.array_types import four_numbers
-from realtime.numerics.functions import cell_of
+from airlight.realtime.methods.epipolar.slices import Slices, neighbour, pixel_number, slice_coordinate
+from airlight.realtime.numerics.array_types import four_numbers
+from airlight.realtime.numerics.functions import cell_of
 
 WORD = 32  #: samples to a word of bits
 STEPS = (1, 2, 4, 8, 16, 32)

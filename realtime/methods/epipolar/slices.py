@@ -25,9 +25,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import four_numbers
-from realtime.scene.camera import Camera
-from realtime.scene.lights import Light
+from airlight.realtime.numerics.array_types import four_numbers
+from airlight.realtime.scene.camera import Camera
+from airlight.realtime.scene.lights import Light
 
 
 @dataclass(frozen=True)

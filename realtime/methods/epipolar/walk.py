@@ -29,9 +29,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, open_interval
-from realtime.methods.epipolar.min_max_tree import SliceHeights, line_point, node_pair
-from realtime.rays import RayGeometry
+from airlight.realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, open_interval
+from airlight.realtime.methods.epipolar.min_max_tree import SliceHeights, line_point, node_pair
+from airlight.realtime.rays import RayGeometry
 
 
 @dataclass

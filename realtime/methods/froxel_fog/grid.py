@@ -44,12 +44,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.interface.method import View
-from realtime.numerics.array_types import Metres, PerRay, four_numbers
-from realtime.numerics.functions import between_entries
-from realtime.scene.camera import Camera, row_and_column
-from realtime.scene.light_samples import LightTable
-from realtime.scene.media.medium import Medium, Rays
+from airlight.realtime.methods.interface.method import View
+from airlight.realtime.numerics.array_types import Metres, PerRay, four_numbers
+from airlight.realtime.numerics.functions import between_entries
+from airlight.realtime.scene.camera import Camera, row_and_column
+from airlight.realtime.scene.light_samples import LightTable
+from airlight.realtime.scene.media.medium import Medium, Rays
 
 _RATIO = 8  # far/near
 _OPTICAL_REACH = 3.0  # optical depth behind a light that deserves slices: e^-6 = 0.25 % of the light comes back from it

@@ -31,14 +31,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.froxel_fog.grid import Grid
-from realtime.methods.interface.method import View
-from realtime.numerics.array_types import PerRay
-from realtime.numerics.functions import summed
-from realtime.rays import profile
-from realtime.scene.light_samples import LightTable
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Rays
+from airlight.realtime.methods.froxel_fog.grid import Grid
+from airlight.realtime.methods.interface.method import View
+from airlight.realtime.numerics.array_types import PerRay
+from airlight.realtime.numerics.functions import summed
+from airlight.realtime.rays import profile
+from airlight.realtime.scene.light_samples import LightTable
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Rays
 
 #: (point, light, its number among lights without extent, or among light samples) -> whether it is lit.
 Visibility = Callable[[Any, Light, Any], Any]

@@ -14,16 +14,23 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from realtime.memory import check_memory
-from realtime.methods.froxel_fog.grid import accumulated, airlight_at_pixels, column_rays, view_grid
-from realtime.methods.froxel_fog.injection import Visibility, frame_shift, scattered_light
-from realtime.methods.interface.method import Layers, Method, View
-from realtime.numerics.array_types import bytes_of
-from realtime.parameters import parameter
-from realtime.scene.light_samples import LightTable, light_tables
-from realtime.scene.lights import Light
-from realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps, maps_memory
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, check_maps, lit_in_map, map_memory, map_size
+from airlight.realtime.memory import check_memory
+from airlight.realtime.methods.froxel_fog.grid import accumulated, airlight_at_pixels, column_rays, view_grid
+from airlight.realtime.methods.froxel_fog.injection import Visibility, frame_shift, scattered_light
+from airlight.realtime.methods.interface.method import Layers, Method, View
+from airlight.realtime.numerics.array_types import bytes_of
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.light_samples import LightTable, light_tables
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps, maps_memory
+from airlight.realtime.shadow_maps.shadow_map import (
+    ShadowMap,
+    cast_shadow_map,
+    check_maps,
+    lit_in_map,
+    map_memory,
+    map_size,
+)
 
 _NUMBERS = 12  # of a froxel: scattered light and airlight, four each, and as much on the way
 

@@ -21,7 +21,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.scene.media.medium import LitRays
+from airlight.realtime.scene.media.medium import LitRays
 
 _LEAST_HEIGHT = 2.0**-10  # h over g, of the docstring
 

@@ -21,16 +21,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
-from realtime.area_lights.points import LightSamples
-from realtime.errors import InputError
-from realtime.numerics.array_types import Metres, PerRay
-from realtime.numerics.noise import PATTERNS, Noise
-from realtime.parameters import Parameters, defaults, parameter, read_parameters, values
-from realtime.rays import RayGeometry, ray_geometry
-from realtime.scene.camera import Camera, ray_directions, row_and_column
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import LitRays, Medium, Rays
-from realtime.scene.read_scene import Scene, SceneFeatures
+from airlight.realtime.area_lights.points import LightSamples
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import Metres, PerRay
+from airlight.realtime.numerics.noise import PATTERNS, Noise
+from airlight.realtime.parameters import Parameters, defaults, parameter, read_parameters, values
+from airlight.realtime.rays import RayGeometry, ray_geometry
+from airlight.realtime.scene.camera import Camera, ray_directions, row_and_column
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import LitRays, Medium, Rays
+from airlight.realtime.scene.read_scene import Scene, SceneFeatures
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.texel_walls import height_in, parts_of
-from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds, texel_heights, texel_walls
+from airlight.realtime.methods.light_volumes.texel_walls import height_in, parts_of
+from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds, texel_heights, texel_walls
 
 _NEARER = 1 - 1e-4  # of the nearest height, with room for rounding
 _STEEP = 1e30  # stands for 1/0: lines that are never crossed lie far beyond [0, 1]

@@ -19,10 +19,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
-from realtime.scene.lights import Light
-from realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start
-from realtime.shadow_maps.shadow_map import cast_map_rays
+from airlight.realtime.methods.light_volumes.texel_walls import BOTTOM, LEFT, PLACES, RIGHT, TOP, walled_heights
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start
+from airlight.realtime.shadow_maps.shadow_map import cast_map_rays
 
 _HALVINGS = PLACES.bit_length() - 1
 _JUMP = 0.05  # of the larger height: walls lower than that are left slanted

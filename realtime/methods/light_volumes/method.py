@@ -24,18 +24,18 @@ from dataclasses import dataclass
 
 import drjit as dr
 
-from realtime.errors import InputError
-from realtime.methods.interface.method import Method, tolerance
-from realtime.methods.light_volumes.jump_search import with_walls
-from realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
-from realtime.methods.light_volumes.published.raster import mesh_airlight
-from realtime.methods.light_volumes.walk import sum_lit_intervals
-from realtime.numerics.array_types import bytes_of
-from realtime.parameters import parameter
-from realtime.scene.lights import Light
-from realtime.shadow_maps.inverse_depth_field import inverse_depth_field, level_start
-from realtime.shadow_maps.projection import light_faces
-from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_memory, map_size
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import Method, tolerance
+from airlight.realtime.methods.light_volumes.jump_search import with_walls
+from airlight.realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
+from airlight.realtime.methods.light_volumes.published.raster import mesh_airlight
+from airlight.realtime.methods.light_volumes.walk import sum_lit_intervals
+from airlight.realtime.numerics.array_types import bytes_of
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field, level_start
+from airlight.realtime.shadow_maps.projection import light_faces
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_memory, map_size
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.light_volumes.face_lines import Line, at_line, borders
-from realtime.methods.light_volumes.texel_walls import (
+from airlight.realtime.methods.light_volumes.face_lines import Line, at_line, borders
+from airlight.realtime.methods.light_volumes.texel_walls import (
     BOTTOM,
     LEFT,
     RIGHT,
@@ -25,7 +25,7 @@ from realtime.methods.light_volumes.texel_walls import (
     side_of,
     value_at,
 )
-from realtime.shadow_maps.inverse_depth_field import texel_heights, texel_walls
+from airlight.realtime.shadow_maps.inverse_depth_field import texel_heights, texel_walls
 
 
 @dataclass

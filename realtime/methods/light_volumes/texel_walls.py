@@ -27,7 +27,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start, texel_heights
+from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, level_start, texel_heights
 
 PLACES = 64  #: on a side, where a wall may stand: what is smaller costs rays, and outlines between two sides are bent
 BOTTOM, TOP, LEFT, RIGHT = range(4)  #: sides of a texel, v = 0, v = 1, u = 0 and u = 1, by their bytes

@@ -24,10 +24,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
-from realtime.methods.light_volumes.face_lines import Line, at_line, distance_at, face_ray, in_face, line_of
-from realtime.methods.light_volumes.texel_crossings import passage, texel_crossings
-from realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
+from airlight.realtime.intervals import LitIntervals, add_waiting, close_interval, no_intervals, sum_at_end
+from airlight.realtime.methods.light_volumes.face_lines import Line, at_line, distance_at, face_ray, in_face, line_of
+from airlight.realtime.methods.light_volumes.texel_crossings import passage, texel_crossings
+from airlight.realtime.shadow_maps.inverse_depth_field import InverseDepthField, node_bounds
 
 _FIRST = 3  # levels below that of the whole face, at which a ray begins
 _FACE_BITS = 3  # of the number of a face in an order of faces

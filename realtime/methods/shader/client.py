@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from realtime.errors import InputError, NoDriverError
+from airlight.realtime.errors import InputError, NoDriverError
 
 _LIMIT, LIMIT_VARIABLE = 300.0, "AIRLIGHT_METHOD_LIMIT"  # that a user's method may take for one scene or command [s]
 _LONGEST = 2e9  # s: `signal.alarm`, by which the host ends a driver that never returns, takes 2^31 - 1 at most

@@ -12,15 +12,22 @@ from typing import Any, ClassVar
 import mitsuba as mi
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.methods.interface.method import Layers, Method
-from realtime.methods.shader.client import ShaderHost
-from realtime.methods.shader.prelude import phase_text, stage_text
-from realtime.methods.shader.scene_arrays import check_scene, light_array, map_array, phase_table, ray_arrays, uniforms
-from realtime.methods.shader.source import ShaderSource, read_shader
-from realtime.methods.user_method import check_names, checked_radiance
-from realtime.parameters import parameter, values
-from realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_size
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import Layers, Method
+from airlight.realtime.methods.shader.client import ShaderHost
+from airlight.realtime.methods.shader.prelude import phase_text, stage_text
+from airlight.realtime.methods.shader.scene_arrays import (
+    check_scene,
+    light_array,
+    map_array,
+    phase_table,
+    ray_arrays,
+    uniforms,
+)
+from airlight.realtime.methods.shader.source import ShaderSource, read_shader
+from airlight.realtime.methods.user_method import check_names, checked_radiance
+from airlight.realtime.parameters import parameter, values
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_size
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ tangent computes the distance of this angle to the cut-off: a difference of two 
 from collections.abc import Mapping
 from typing import Any
 
-from realtime.methods.shader.source import OWN_LINES, Pass, ShaderSource
-from realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, Rayleigh
+from airlight.realtime.methods.shader.source import OWN_LINES, Pass, ShaderSource
+from airlight.realtime.scene.phase import HenyeyGreenstein, Isotropic, Phase, Rayleigh
 
 _GIVEN = """
 #define POINT 0

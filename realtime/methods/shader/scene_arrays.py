@@ -13,15 +13,15 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
-from realtime.methods.interface.method import View
-from realtime.numerics.array_types import host_numbers
-from realtime.scene.camera import read_camera
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
-from realtime.scene.phase import HenyeyGreenstein, Tabulated
-from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.shadow_map import ShadowMap
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import View
+from airlight.realtime.numerics.array_types import host_numbers
+from airlight.realtime.scene.camera import read_camera
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import OPTICAL_REACH, Homogeneous
+from airlight.realtime.scene.phase import HenyeyGreenstein, Tabulated
+from airlight.realtime.scene.read_scene import Scene
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 
 Array = NDArray[np.float32]
 

@@ -29,11 +29,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
-from realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
-from realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
-from realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
-from realtime.methods.shadow_planes.published_mesh import (
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
+from airlight.realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
+from airlight.realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
+from airlight.realtime.methods.shadow_planes.published_mesh import (
     check_vertices,
     gamma_at,
     mesh_gamma,
@@ -41,16 +41,16 @@ from realtime.methods.shadow_planes.published_mesh import (
     surface_gamma,
     visible_triangle,
 )
-from realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring
-from realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
-from realtime.numerics.array_types import host_numbers, types_of
-from realtime.parameters import parameter
-from realtime.scene.camera import read_camera
-from realtime.scene.lights import Light, host_position
-from realtime.scene.media.bounded_rays import FORMS, BoundedRays
-from realtime.scene.media.medium import LitRays
-from realtime.scene.mesh_adjacency import Occluders, read_occluders, with_positions
-from realtime.scene.read_scene import Scene
+from airlight.realtime.methods.shadow_planes.silhouettes import components_in_view, cone_ring
+from airlight.realtime.methods.shadow_planes.sweep import RayPlanes, ray_planes, sum_lit_intervals
+from airlight.realtime.numerics.array_types import host_numbers, types_of
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.camera import read_camera
+from airlight.realtime.scene.lights import Light, host_position
+from airlight.realtime.scene.media.bounded_rays import FORMS, BoundedRays
+from airlight.realtime.scene.media.medium import LitRays
+from airlight.realtime.scene.mesh_adjacency import Occluders, read_occluders, with_positions
+from airlight.realtime.scene.read_scene import Scene
 
 
 @dataclass(frozen=True)

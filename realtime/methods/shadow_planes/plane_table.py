@@ -63,12 +63,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.errors import InputError
-from realtime.methods.shadow_planes.silhouettes import NEARNESS, Silhouette, is_outside, ring_edges, silhouette
-from realtime.numerics.array_types import four_numbers, is_single
-from realtime.numerics.functions import TURN, host_diamond_angle, host_direction
-from realtime.scene.lights import place_and_weight
-from realtime.scene.mesh_adjacency import Occluders
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.shadow_planes.silhouettes import NEARNESS, Silhouette, is_outside, ring_edges, silhouette
+from airlight.realtime.numerics.array_types import four_numbers, is_single
+from airlight.realtime.numerics.functions import TURN, host_diamond_angle, host_direction
+from airlight.realtime.scene.lights import place_and_weight
+from airlight.realtime.scene.mesh_adjacency import Occluders
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.methods.shadow_planes.plane_table import PlaneIndex
-from realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
+from airlight.realtime.methods.shadow_planes.plane_table import PlaneIndex
+from airlight.realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
 
 
 @dataclass(frozen=True)

@@ -51,16 +51,16 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
-from realtime.methods.interface.method import View
-from realtime.methods.shadow_planes.plane_table import PlaneIndex
-from realtime.methods.shadow_planes.published_crossings import Buffer, Entry, sum_crossings
-from realtime.methods.shadow_planes.silhouettes import NEARNESS
-from realtime.methods.shadow_planes.sweep import RayPlanes
-from realtime.rays import ray_geometry
-from realtime.scene.lights import Light
-from realtime.scene.media.bounded_rays import BoundedRays, Piece, camera_pieces
-from realtime.scene.media.medium import Medium
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import View
+from airlight.realtime.methods.shadow_planes.plane_table import PlaneIndex
+from airlight.realtime.methods.shadow_planes.published_crossings import Buffer, Entry, sum_crossings
+from airlight.realtime.methods.shadow_planes.silhouettes import NEARNESS
+from airlight.realtime.methods.shadow_planes.sweep import RayPlanes
+from airlight.realtime.rays import ray_geometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.bounded_rays import BoundedRays, Piece, camera_pieces
+from airlight.realtime.scene.media.medium import Medium
 
 RATIO = 1.5
 

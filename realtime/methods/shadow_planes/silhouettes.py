@@ -42,9 +42,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realtime.scene.camera import HostCamera
-from realtime.scene.lights import place_and_weight
-from realtime.scene.mesh_adjacency import Occluders
+from airlight.realtime.scene.camera import HostCamera
+from airlight.realtime.scene.lights import place_and_weight
+from airlight.realtime.scene.mesh_adjacency import Occluders
 
 Array = NDArray[np.float64]
 

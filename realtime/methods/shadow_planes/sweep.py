@@ -25,7 +25,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.intervals import (
+from airlight.realtime.intervals import (
     LitIntervals,
     add_waiting,
     close_interval,
@@ -36,7 +36,7 @@ from realtime.intervals import (
     pop,
     sum_at_end,
 )
-from realtime.methods.shadow_planes.plane_table import (
+from airlight.realtime.methods.shadow_planes.plane_table import (
     FULL,
     GAIN_SHIFT,
     GAIN_ZERO,
@@ -45,8 +45,8 @@ from realtime.methods.shadow_planes.plane_table import (
     plane_crossing,
     planes_of_rays,
 )
-from realtime.numerics.array_types import two_numbers
-from realtime.numerics.functions import diamond_angle
+from airlight.realtime.numerics.array_types import two_numbers
+from airlight.realtime.numerics.functions import diamond_angle
 
 FEW, MANY = 2, 8  #: crossings that wait for others which may come before them, or are collected at once
 _DUE = 3  # marks in the last bits of a place where waiting integrals are added

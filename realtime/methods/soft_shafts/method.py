@@ -30,8 +30,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
-from realtime.image_filters import (
+from airlight.realtime.errors import InputError
+from airlight.realtime.image_filters import (
     Guide,
     Raster,
     airlight_guide,
@@ -43,10 +43,10 @@ from realtime.image_filters import (
     tile_average,
     upsample,
 )
-from realtime.methods.interface.marching import marched_integral
-from realtime.methods.interface.method import Layers, View
-from realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
-from realtime.methods.soft_shafts.sources import (
+from airlight.realtime.methods.interface.marching import marched_integral
+from airlight.realtime.methods.interface.method import Layers, View
+from airlight.realtime.methods.soft_shafts.parameters import AUTO, SoftShaftsParameters
+from airlight.realtime.methods.soft_shafts.sources import (
     AUTO_WIDTH,
     AUTO_WIDTH_SHARED,
     Fraction,
@@ -58,11 +58,11 @@ from realtime.methods.soft_shafts.sources import (
     reached_surfaces,
     source_state,
 )
-from realtime.numerics.array_types import two_numbers
-from realtime.numerics.functions import summed
-from realtime.scene.lights import Light, sources_of
-from realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
-from realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
+from airlight.realtime.numerics.array_types import two_numbers
+from airlight.realtime.numerics.functions import summed
+from airlight.realtime.scene.lights import Light, sources_of
+from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
+from airlight.realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
 
 _MOST_AUTO = 8.0  # the widest filter of hd=auto [pixels]
 _LEAST_AUTO, _LEAST_SHARED = 0.3, 0.5  # its narrowest, and that where pixels share the points [pixels]

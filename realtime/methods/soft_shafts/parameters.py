@@ -5,11 +5,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from realtime.area_lights.points import LightSamples
-from realtime.errors import InputError
-from realtime.methods.interface.method import Method
-from realtime.parameters import parameter
-from realtime.shadow_maps.shadow_map import map_size
+from airlight.realtime.area_lights.points import LightSamples
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.interface.method import Method
+from airlight.realtime.parameters import parameter
+from airlight.realtime.shadow_maps.shadow_map import map_size
 
 AUTO = "auto"
 MOST_HD = 64.0  #: [pixels]

@@ -23,15 +23,15 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
-from realtime.methods.interface.method import View
-from realtime.methods.soft_shafts.parameters import SoftShaftsParameters
-from realtime.numerics.array_types import two_numbers
-from realtime.scene.camera import Camera
-from realtime.scene.light_samples import LightTable, light_tables
-from realtime.scene.lights import Light
-from realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps
-from realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
+from airlight.realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
+from airlight.realtime.methods.interface.method import View
+from airlight.realtime.methods.soft_shafts.parameters import SoftShaftsParameters
+from airlight.realtime.numerics.array_types import two_numbers
+from airlight.realtime.scene.camera import Camera
+from airlight.realtime.scene.light_samples import LightTable, light_tables
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,13 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.errors import InputError
-from realtime.scene.density import Density
-from realtime.scene.media.bounded_rays import BoundedRays, camera_pieces, check_form
-from realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.media.published_form import ConstantLeg
-from realtime.scene.phase import Phase
+from airlight.realtime.errors import InputError
+from airlight.realtime.scene.density import Density
+from airlight.realtime.scene.media.bounded_rays import BoundedRays, camera_pieces, check_form
+from airlight.realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.media.published_form import ConstantLeg
+from airlight.realtime.scene.phase import Phase
 
 
 @dataclass(frozen=True)

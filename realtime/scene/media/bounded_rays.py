@@ -58,14 +58,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
-from realtime.numerics.array_types import chosen_value, is_single
-from realtime.numerics.functions import exp_bounded, summed, unit_nodes
-from realtime.scene.lights import Light
-from realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
-from realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach, unfinished
-from realtime.scene.media.published_form import ConstantLeg
-from realtime.scene.rule_reach import TANGENT, TURN_DEPTH, TURN_NODES, angle_scale
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import chosen_value, is_single
+from airlight.realtime.numerics.functions import exp_bounded, summed, unit_nodes
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
+from airlight.realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach, unfinished
+from airlight.realtime.scene.media.published_form import ConstantLeg
+from airlight.realtime.scene.rule_reach import TANGENT, TURN_DEPTH, TURN_NODES, angle_scale
 
 FORMS = ("exact", "paper", "printed")
 _NODES_DOUBLE = 6

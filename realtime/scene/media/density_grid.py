@@ -12,9 +12,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.scene.density import Density
-from realtime.scene.media.medium import VaryingMedium
-from realtime.scene.phase import Phase
+from airlight.realtime.scene.density import Density
+from airlight.realtime.scene.media.medium import VaryingMedium
+from airlight.realtime.scene.phase import Phase
 
 _GAUSS = 12**-0.5  # half of the distance of the two nodes over the length
 _LEAST = 1e-3  # of a voxel: a walk goes at least so far, over the next face

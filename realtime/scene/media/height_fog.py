@@ -40,11 +40,11 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.errors import InputError
-from realtime.numerics.array_types import is_single
-from realtime.numerics.functions import exp_bounded, exp_expm1_bounded, unit_nodes
-from realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach, unfinished
-from realtime.scene.phase import Phase
+from airlight.realtime.errors import InputError
+from airlight.realtime.numerics.array_types import is_single
+from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded, unit_nodes
+from airlight.realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach, unfinished
+from airlight.realtime.scene.phase import Phase
 
 _NODES, _NODES_DOUBLE = 12, 28
 _WIDTH, _SCALE_HEIGHTS, _DEPTH = 4.2, 10.0, 12.0  # of a panel at most: in ln E, of rise, of optical depth

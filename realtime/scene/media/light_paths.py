@@ -45,10 +45,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from realtime.numerics.array_types import four_numbers
-from realtime.scene.closed_mesh import CELLS
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous, Medium
+from airlight.realtime.numerics.array_types import four_numbers
+from airlight.realtime.scene.closed_mesh import CELLS
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous, Medium
 
 _FAR = 1e30  #: e of no plane
 _FEW = 16  #: planes that are read faster than walked over

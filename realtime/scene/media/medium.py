@@ -15,10 +15,10 @@ from typing import Any
 
 import drjit as dr
 
-from realtime.numerics.array_types import is_single
-from realtime.numerics.functions import exp_bounded, unit_nodes
-from realtime.scene.lights import Light
-from realtime.scene.phase import Phase
+from airlight.realtime.numerics.array_types import is_single
+from airlight.realtime.numerics.functions import exp_bounded, unit_nodes
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.phase import Phase
 
 OPTICAL_REACH = 20.0  #: optical depths after which float32 has nothing left of light: e^-20 = 2e-9
 _NODES = 16  # of each part of a segment in a medium that has no integral of its own

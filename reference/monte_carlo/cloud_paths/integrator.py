@@ -13,10 +13,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.monte_carlo.batches import Batches, check_samples, single_batch
-from reference.monte_carlo.cloud_paths.tables import walk_scene
-from reference.monte_carlo.cloud_paths.walk import Targets, walk
-from reference.scene.clouds import CloudScene
+from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
+from airlight.reference.monte_carlo.cloud_paths.tables import walk_scene
+from airlight.reference.monte_carlo.cloud_paths.walk import Targets, walk
+from airlight.reference.scene.clouds import CloudScene
 
 Array = NDArray[np.float64]
 Sets = Sequence[tuple[int, float]]

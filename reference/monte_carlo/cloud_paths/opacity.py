@@ -13,9 +13,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.scene.clouds import CloudScene
-from reference.scene.shapes import triangles_of
-from reference.visibility.distances import to_plane
+from airlight.reference.scene.clouds import CloudScene
+from airlight.reference.scene.shapes import triangles_of
+from airlight.reference.visibility.distances import to_plane
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.monte_carlo.cloud_paths.phases import WalkPhase, walk_phase
-from reference.scene.clouds import CloudDensity, CloudScene
+from airlight.reference.monte_carlo.cloud_paths.phases import WalkPhase, walk_phase
+from airlight.reference.scene.clouds import CloudDensity, CloudScene
 
 _FOUR_PI = 4 * np.pi
 #: How far past a crossing the next ray starts, relative to the largest coordinate: what float32 can tell apart.

@@ -40,7 +40,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from reference.monte_carlo.cloud_paths.tables import WalkScene
+from airlight.reference.monte_carlo.cloud_paths.tables import WalkScene
 
 MAIN, SIDE, SHADOW, SIDE_SHADOW, SURFACE_SHADOW = range(5)  #: what the ray of a lane is
 _LEAST_WEIGHT = 0.05

@@ -40,8 +40,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.scene.area_light import ReferenceAreaLight, triangle_areas, triangle_normals
-from reference.scene.device import on_device
+from airlight.reference.scene.area_light import ReferenceAreaLight, triangle_areas, triangle_normals
+from airlight.reference.scene.device import on_device
 
 _PARALLEL = 1e-9  # sine of the angle between ray and plane below which they count as parallel
 _FADE = 16.0  # how soon points about the ray become fewer as it passes further from the light

@@ -22,17 +22,17 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from reference.monte_carlo.single_scatter.boundary_walk import (
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import (
     Surroundings,
     coefficients,
     is_boundary,
     medium_at,
     step_beyond,
 )
-from reference.monte_carlo.single_scatter.sources import Source
-from reference.monte_carlo.single_scatter.stretches import Part, Ray, Stretch, cell_of, place_of
-from reference.monte_carlo.single_scatter.varying_media import varying_part
-from reference.scene.varying import VaryingMedium
+from airlight.reference.monte_carlo.single_scatter.sources import Source
+from airlight.reference.monte_carlo.single_scatter.stretches import Part, Ray, Stretch, cell_of, place_of
+from airlight.reference.monte_carlo.single_scatter.varying_media import varying_part
+from airlight.reference.scene.varying import VaryingMedium
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.monte_carlo.batches import Batches, check_samples, single_batch
-from reference.monte_carlo.single_scatter.boundary_walk import Surroundings
-from reference.monte_carlo.single_scatter.estimator import Task, ray_light
-from reference.monte_carlo.single_scatter.sources import sources_of
-from reference.monte_carlo.single_scatter.stretches import double_ray
-from reference.scene.read import ReferenceScene
-from reference.scene.varying import VaryingMedium
+from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surroundings
+from airlight.reference.monte_carlo.single_scatter.estimator import Task, ray_light
+from airlight.reference.monte_carlo.single_scatter.sources import sources_of
+from airlight.reference.monte_carlo.single_scatter.stretches import double_ray
+from airlight.reference.scene.read import ReferenceScene
+from airlight.reference.scene.varying import VaryingMedium
 
 _RAYS = 1 << 20  # camera rays in one kernel
 

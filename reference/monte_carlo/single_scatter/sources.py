@@ -18,13 +18,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.monte_carlo.single_scatter.area_sampling import Emitting, LightSample, emitting
-from reference.monte_carlo.single_scatter.boundary_walk import step_beyond
-from reference.monte_carlo.single_scatter.distance_sampling import Approach, Span, closest_approach, cone_ends
-from reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
-from reference.scene.area_light import is_area
-from reference.scene.directional_light import is_directional
-from reference.scene.read import ReferenceScene, whole_scene
+from airlight.reference.monte_carlo.single_scatter.area_sampling import Emitting, LightSample, emitting
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import step_beyond
+from airlight.reference.monte_carlo.single_scatter.distance_sampling import Approach, Span, closest_approach, cone_ends
+from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray, point_on
+from airlight.reference.scene.area_light import is_area
+from airlight.reference.scene.directional_light import is_directional
+from airlight.reference.scene.read import ReferenceScene, whole_scene
 
 _FARTHEST = 1e15  # of places that light is scattered at [m]: squares of longer ways overflow in single precision
 _LEAST_SLOPE = 1e-12  # of a ray against the plane of a light's point

@@ -12,8 +12,13 @@ from typing import Any, ClassVar
 import drjit as dr
 import mitsuba as mi
 
-from reference.monte_carlo.single_scatter.boundary_walk import Segment, Surroundings, medium_at, transmittance
-from reference.monte_carlo.single_scatter.distance_sampling import Span, mixture_of, sample_distance, sample_stretch
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import Segment, Surroundings, medium_at, transmittance
+from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
+    Span,
+    mixture_of,
+    sample_distance,
+    sample_stretch,
+)
 
 _STEPS = (0.7548776662466927, 0.5698402909980532)  # 1/x and 1/x^2 with x^3 = x + 1: they fill a square evenly
 

@@ -26,10 +26,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from reference.monte_carlo.single_scatter.boundary_walk import Surroundings, unblocked
-from reference.monte_carlo.single_scatter.distance_sampling import Span, equi_angular, equi_angular_pdf
-from reference.monte_carlo.single_scatter.stretches import Part, Path, Ray
-from reference.scene.varying import HeightMedium, VaryingMedium
+from airlight.reference.monte_carlo.single_scatter.boundary_walk import Surroundings, unblocked
+from airlight.reference.monte_carlo.single_scatter.distance_sampling import Span, equi_angular, equi_angular_pdf
+from airlight.reference.monte_carlo.single_scatter.stretches import Part, Path, Ray
+from airlight.reference.scene.varying import HeightMedium, VaryingMedium
 
 _LEVEL = 1e-5  # scale heights between two heights that are as good as one
 _FARTHEST = 1e6  # of level rays [m]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.monte_carlo.slab_walk.walk import Counts, Slab, walk
+from airlight.reference.monte_carlo.slab_walk.walk import Counts, Slab, walk
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from reference.monte_carlo.slab_walk.scattering import turned
+from airlight.reference.monte_carlo.slab_walk.scattering import turned
 
 Array = NDArray[np.float64]
 Vectors = tuple[Array, Array, Array]

@@ -20,7 +20,7 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from validation.certified.files import FOLDER
+from airlight.validation.certified.files import FOLDER
 
 SCHEMA = "airlight-certified-area/1"
 _DIGITS = 15

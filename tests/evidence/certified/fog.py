@@ -27,7 +27,8 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from analytic.phase import PhaseFunction
+from airlight.analytic.phase import PhaseFunction
+from airlight.validation.certified.files import FOLDER
 from tests.evidence.certified.integral import integrate_certified
 from tests.evidence.certified.intervals import (
     Number,
@@ -51,7 +52,6 @@ from tests.evidence.certified.model import (
     fog_scenes,
     mitsuba_dict,
 )
-from validation.certified.files import FOLDER
 
 SCHEMA = "airlight-certified-fog/1"
 DIGITS = 12  #: significant digits of a radiance

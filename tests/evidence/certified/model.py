@@ -16,7 +16,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from validation.certified.files import certified_data
+from airlight.validation.certified.files import certified_data
 
 Point = tuple[float, ...]  # of 3 numbers
 Matrix = tuple[tuple[float, ...], ...]  # 4 rows of 4

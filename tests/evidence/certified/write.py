@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mpmath import mp
 
-from analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.phase import PhaseFunction, phase_from_words
 from tests.evidence.certified import airlight_integral, height_fog
 from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 

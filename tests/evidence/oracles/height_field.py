@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from realtime.methods.light_volumes.texel_walls import PLACES
-from realtime.shadow_maps.shadow_map import ShadowMap
+from airlight.analytic.errors import InputError
+from airlight.realtime.methods.light_volumes.texel_walls import PLACES
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

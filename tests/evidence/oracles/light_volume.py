@@ -41,17 +41,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from analytic.errors import InputError
-from realtime.methods.light_volumes.jump_search import with_walls
-from realtime.scene.read_scene import Scene
-from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
-from realtime.shadow_maps.shadow_map import ShadowMap
-from reference.quadrature.light_airlight import lit_sums
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import ReferenceLight, ReferenceScene
-from reference.visibility.certificate import LitIntervals
-from reference.visibility.distances import exact_distance
-from reference.visibility.planes import Rays, cone_interval, rays_at
+from airlight.analytic.errors import InputError
+from airlight.realtime.methods.light_volumes.jump_search import with_walls
+from airlight.realtime.scene.read_scene import Scene
+from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap
+from airlight.reference.quadrature.light_airlight import lit_sums
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.read import ReferenceLight, ReferenceScene
+from airlight.reference.visibility.certificate import LitIntervals
+from airlight.reference.visibility.distances import exact_distance
+from airlight.reference.visibility.planes import Rays, cone_interval, rays_at
 from tests.evidence.oracles.height_field import Array, HeightField, Index, Path, by_ray, height_field, zero_angle
 from tests.evidence.oracles.upright_walls import walled_parts
 

@@ -6,8 +6,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.collector_search import Search, cold_start, collector_light
-from realtime.clouds.light_maps import (
+from airlight.realtime.clouds.collector_search import Search, cold_start, collector_light
+from airlight.realtime.clouds.light_maps import (
     LitSurfaces,
     cast_surfaces,
     filtered_map,
@@ -15,13 +15,13 @@ from realtime.clouds.light_maps import (
     light_map,
     slope_normals,
 )
-from realtime.numerics.array_types import aligned_array
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.validation.scenes.meshes import box, rotation
+from airlight.validation.scenes.parts import medium_boundary
 from tests.helpers.frames import read
 from tests.helpers.scenes import clear_scene
 from tests.helpers.sunlit import ALONG, SIDES, cube, sun, unit
 from tests.helpers.sunlit import CUBE_AT as MIDDLE
-from validation.scenes.meshes import box, rotation
-from validation.scenes.parts import medium_boundary
 
 SIZE = 64
 

@@ -6,12 +6,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.march import cloud_surfaces, depths_along, next_crossing, segment_through
-from realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_as_printed, opacity_of
-from realtime.numerics.array_types import aligned_array
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.clouds.march import cloud_surfaces, depths_along, next_crossing, segment_through
+from airlight.realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_as_printed, opacity_of
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import box, placed
 from tests.helpers.clouds import SUN, cloud, crossings, length_inside, loaded, ring
-from validation.scenes.meshes import box, placed
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -11,17 +11,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import realtime.methods.cloud_collectors as method
-from realtime.clouds.collector_search import Search
-from realtime.clouds.density_maps import dense_surface, light_depths, sun_depths
-from realtime.clouds.march import cloud_surfaces, depths_along, segment_through
-from realtime.numerics.array_types import aligned_array
-from realtime.scene.camera import ray_directions
-from realtime.scene.read_scene import read_scene
+import airlight.realtime.methods.cloud_collectors as method
+from airlight.realtime.clouds.collector_search import Search
+from airlight.realtime.clouds.density_maps import dense_surface, light_depths, sun_depths
+from airlight.realtime.clouds.march import cloud_surfaces, depths_along, segment_through
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.realtime.scene.camera import ray_directions
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import box, placed
 from tests.helpers.clouds import SUN, TURN, cloud, cloud_scene, crossings, dense, linear_between, ring
 from tests.helpers.frames import render
 from tests.helpers.transport_formula import slabs_as_they_are
-from validation.scenes.meshes import box, placed
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -13,14 +13,14 @@ import pytest
 from numpy.typing import NDArray
 from PythonicDISORT.pydisort import pydisort
 
-from realtime.clouds.canonical.coordinates import SETS
-from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.slab_orders.discrete_ordinates import double_gauss
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.clouds.uniform_sky import slab_escapes
-from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
-from reference.monte_carlo.slab_walk.walk import Slab, flights
-from validation.slab.moments import FLUENCE, UP, SlabOrders, order_sets
+from airlight.realtime.clouds.canonical.coordinates import SETS
+from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
+from airlight.realtime.clouds.slab_orders.discrete_ordinates import double_gauss
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from airlight.realtime.clouds.uniform_sky import slab_escapes
+from airlight.reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein
+from airlight.reference.monte_carlo.slab_walk.walk import Slab, flights
+from airlight.validation.slab.moments import FLUENCE, UP, SlabOrders, order_sets
 
 # Photons by directions -----------------------------------------------------------------------------------------------
 

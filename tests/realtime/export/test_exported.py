@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import airlight
-from realtime.export.text import BUILT_IN, CONFORMING, kernel_text
-from realtime.kernels.exact import exact
-from realtime.kernels.stepping import quadrature
-from realtime.methods.shader.client import ShaderHost
-from realtime.scene.phase import named_phase
-from reports.api.export import MEASURED
-from reports.machine.driver_check import certified_rays, exported_values
+from airlight.realtime.export.text import BUILT_IN, CONFORMING, kernel_text
+from airlight.realtime.kernels.exact import exact
+from airlight.realtime.kernels.stepping import quadrature
+from airlight.realtime.methods.shader.client import ShaderHost
+from airlight.realtime.scene.phase import named_phase
+from airlight.reports.api.export import MEASURED
+from airlight.reports.machine.driver_check import certified_rays, exported_values
 from tests.helpers.exported import KERNELS, PHASES, measured
 from tests.helpers.kernel_values import kernel_values, true_values
 from tests.helpers.loose_device import on_loose_device

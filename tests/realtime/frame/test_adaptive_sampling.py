@@ -11,14 +11,14 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from realtime.frame.adaptive_sampling import adaptive_layers, tile_corners
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.interface.method import Layers, Method
-from realtime.methods.interface.method import tolerance as tolerance_parameter
-from realtime.methods.registry import METHODS
-from realtime.scene.camera import tiled_pixels
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.frame.adaptive_sampling import adaptive_layers, tile_corners
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.interface.method import Layers, Method
+from airlight.realtime.methods.interface.method import tolerance as tolerance_parameter
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.camera import tiled_pixels
+from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
 SIZE = 48, 32

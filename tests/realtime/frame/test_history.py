@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from realtime.errors import InputError
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import frame_renderer, image_frame, render_frame
-from realtime.methods.history import with_history
-from realtime.methods.interface.method import Layers, Method
-from realtime.methods.registry import METHODS, find_method
-from realtime.numerics.noise import PATTERNS, Noise, blue_mask, pcg4d
-from realtime.parameters import parameter
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.methods.history import with_history
+from airlight.realtime.methods.interface.method import Layers, Method
+from airlight.realtime.methods.registry import METHODS, find_method
+from airlight.realtime.numerics.noise import PATTERNS, Noise, blue_mask, pcg4d
+from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.frames import relative_rmse
 from tests.helpers.scenes import tiny_scene
 from tests.realtime.methods.froxel_fog.test_method import lamp_above

@@ -8,13 +8,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import realtime.frame.renderer as module
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import FrameRenderer, frame_renderer, image_frame, run_stages
-from realtime.kernels.registry import KERNELS
-from realtime.methods.interface.method import Method
-from realtime.methods.registry import METHODS
-from realtime.scene.animate import (
+import airlight.realtime.frame.renderer as module
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import FrameRenderer, frame_renderer, image_frame, run_stages
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.interface.method import Method
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.animate import (
     closed_shapes,
     coloured_light,
     read_objects,
@@ -22,14 +22,14 @@ from realtime.scene.animate import (
     turned_light,
     turned_objects,
 )
-from realtime.scene.mesh_adjacency import read_occluders
-from realtime.scene.read_scene import Scene, read_scene
+from airlight.realtime.scene.mesh_adjacency import read_occluders
+from airlight.realtime.scene.read_scene import Scene, read_scene
+from airlight.validation.scenes.loading import load_scene, resize
+from airlight.validation.scenes.meshes import rotation
+from airlight.validation.scenes.parts import area_lamp
+from airlight.validation.study.frame_times import timed_image
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.sunlit import cube
-from validation.scenes.loading import load_scene, resize
-from validation.scenes.meshes import rotation
-from validation.scenes.parts import area_lamp
-from validation.study.frame_times import timed_image
 
 STILL = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])

@@ -8,15 +8,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import realtime.frame.renderer as renderer_module
-import realtime.scene.light_samples as module
-from realtime.area_lights.shape import turned_area_light
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import image_frame, light_groups, render_frame, run_stages
-from realtime.methods.interface.method import Layers, Method
-from realtime.methods.registry import METHODS
-from realtime.scene.animate import with_area_lights
-from realtime.scene.light_samples import light_samples, light_tables
+import airlight.realtime.frame.renderer as renderer_module
+import airlight.realtime.scene.light_samples as module
+from airlight.realtime.area_lights.shape import turned_area_light
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import image_frame, light_groups, render_frame, run_stages
+from airlight.realtime.methods.interface.method import Layers, Method
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.animate import with_area_lights
+from airlight.realtime.scene.light_samples import light_samples, light_tables
+from airlight.validation.scenes.meshes import rotation
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers import frames
 from tests.helpers.area_lights import BLACK, fog, lamp, lit_scene, ring
@@ -24,7 +25,6 @@ from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.lamps import area_lamp, lit_by
 from tests.helpers.scenes import tiny_scene
 from tests.helpers.sunlit import fog_sphere, shaded
-from validation.scenes.meshes import rotation
 
 SIZE = (32, 24)
 #: Methods with what brings them close to the reference, and the relative RMSE of airlight that remains.

@@ -40,17 +40,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.methods.registry import METHODS
-from realtime.parameters import defaults
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.parameters import defaults
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.height_fog import register_height_fog
+from airlight.validation.scenes.meshes import rotation
+from airlight.validation.scenes.registry import FILES, SCENES
 from tests.helpers import metamorphic as changes
 from tests.helpers.area_lights import ring
 from tests.helpers.frames import render
 from tests.helpers.transport_formula import use_formula
-from validation.scenes.height_fog import register_height_fog
-from validation.scenes.meshes import rotation
-from validation.scenes.registry import FILES, SCENES
 
 TABLES = {name: table for path in FILES for name, table in tomllib.loads(path.read_text()).items()}
 #: Parameters with which a frame is cheap: what is tested does not depend on them.

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from realtime.errors import InputError
-from realtime.frame.renderer import render_frame
-from realtime.frame.samples import render_samples
-from realtime.methods.registry import FOG_METHODS
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.frame.samples import render_samples
+from airlight.realtime.methods.registry import FOG_METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import frames
 from tests.helpers.frames import frame, reference_of, relative_rmse
 from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.quadrature import reference_image
-from validation.scenes.loading import load_scene
-from validation.study.configuration import configuration, prepared
 
 SCENES = {
     "grey": dict,

@@ -14,13 +14,13 @@ import drjit as dr
 import mitsuba as mi
 import pytest
 
-import realtime.numerics.array_types as array_types
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import frame_renderer
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import METHODS
-from realtime.scene.read_scene import read_scene
-from reports.machine.environment import activate
+import airlight.realtime.numerics.array_types as array_types
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import frame_renderer
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reports.machine.environment import activate
 from tests.helpers.clouds import cloud_scene
 from tests.helpers.lamps import lit_by
 from tests.helpers.scenes import spot

@@ -10,18 +10,18 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 
 PROGRAM = """
-from reports.machine.environment import activate
+from airlight.reports.machine.environment import activate
 activate()
 import drjit as dr
 import numpy as np
 import pytest
-from realtime.frame.renderer import render_frame
-from realtime.parameters import defaults
-from realtime.methods.registry import METHODS
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.parameters import defaults
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.transport_formula import use_formula
-from validation.study.configuration import configuration, prepared
-from validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import configuration, prepared
+from airlight.validation.scenes.loading import load_scene
 
 # The tables of clouds take minutes to make, and are the same anyone who draws.
 use_formula(pytest.MonkeyPatch())

@@ -7,14 +7,14 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from analytic.phase import PhaseFunction
-from realtime.errors import InputError
-from realtime.kernels.registry import KERNELS
-from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays import RayGeometry
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import named_phase
+from airlight.analytic.phase import PhaseFunction
+from airlight.realtime.errors import InputError
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import named_phase
 from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 
 PHASES = ("isotropic", "hg")

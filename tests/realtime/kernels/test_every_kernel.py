@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import METHODS
-from realtime.scene.phase import Phase
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.phase import Phase
+from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.kernel_values import RAY, kernel_values
 from tests.helpers.scenes import tiny_scene
 

@@ -7,15 +7,17 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from analytic.panels import airlight_segments
-from analytic.phase import PhaseFunction
-from realtime.kernels.exact import exact, panels_mean, path_interval
-from realtime.kernels.registry import KERNELS
-from realtime.numerics.array_types import aligned_array, array_types
-from realtime.rays import RayGeometry, ray_geometry
-from realtime.scene.lights import Light, spot_fields
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.rule_reach import PANEL_NODES
+from airlight.analytic.panels import airlight_segments
+from airlight.analytic.phase import PhaseFunction
+from airlight.realtime.kernels.exact import exact, panels_mean, path_interval
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.realtime.rays import RayGeometry, ray_geometry
+from airlight.realtime.scene.lights import Light, spot_fields
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.rule_reach import PANEL_NODES
+from airlight.validation.kernels.case_files import read_cases
+from airlight.validation.kernels.cases import integrate_cases
 from tests.helpers.kernel_values import (
     kernel_values,
     opaque,
@@ -25,8 +27,6 @@ from tests.helpers.kernel_values import (
     take,
     true_values,
 )
-from validation.kernels.case_files import read_cases
-from validation.kernels.cases import integrate_cases
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -22,10 +22,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realtime.kernels.exact import exact
+from airlight.realtime.kernels.exact import exact
+from airlight.validation.kernels.cases import evaluate_cases
+from airlight.validation.kernels.rays import hard_rays, table, wide_rays
 from tests.helpers.kernel_values import take
-from validation.kernels.cases import evaluate_cases
-from validation.kernels.rays import hard_rays, table, wide_rays
 
 pytestmark = pytest.mark.usefixtures("variant")
 

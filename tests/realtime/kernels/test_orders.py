@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from airlight.validation.study.configuration import find_kernel, sized
 from tests.helpers.kernel_values import kernel_values, relative_error, true_values
-from validation.study.configuration import find_kernel, sized
 
 G = np.linspace(0.45, 0.75, 7)
 SINGULAR = -0.5 * math.pi + 1j * np.log(1 / G)  # of Henyey-Greenstein's function

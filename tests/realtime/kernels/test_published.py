@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from analytic.phase import PhaseFunction
-from realtime.kernels.closed_form import closed_form, scaled_e1
-from realtime.kernels.exact import exact
-from realtime.kernels.table import table, table_records
-from realtime.kernels.taylor import PRINTED_PHASES, taylor
-from realtime.numerics.array_types import aligned_array, array_types
-from reference.scene.read import read_reference
+from airlight.analytic.phase import PhaseFunction
+from airlight.realtime.kernels.closed_form import closed_form, scaled_e1
+from airlight.realtime.kernels.exact import exact
+from airlight.realtime.kernels.table import table, table_records
+from airlight.realtime.kernels.taylor import PRINTED_PHASES, taylor
+from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.reference.scene.read import read_reference
+from airlight.validation.kernels.case_files import read_cases
 from tests.helpers import frames
 from tests.helpers.frames import relative_rmse
 from tests.helpers.kernel_values import RAY, kernel_values, relative_error, take, true_values
 from tests.helpers.scenes import bounded_medium, clear_scene
-from validation.kernels.case_files import read_cases
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -7,18 +7,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.canonical.coordinates import fraction_of_peak
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import frame_renderer, image_frame, render_frame
-from realtime.methods.registry import METHODS
-from realtime.numerics.array_types import array_types
-from realtime.scene.camera import ray_directions
-from realtime.scene.phase import HenyeyGreenstein
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.clouds.canonical.coordinates import fraction_of_peak
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.scene.camera import ray_directions
+from airlight.realtime.scene.phase import HenyeyGreenstein
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import box, placed, rotation
+from airlight.validation.scenes.parts import camera
 from tests.helpers.clouds import DROPLETS, cloud, cloud_of, cloud_scene, ring
 from tests.helpers.transport_formula import WEIGHTS, Formula, slabs_as_they_are, use_formula
-from validation.scenes.meshes import box, placed, rotation
-from validation.scenes.parts import camera
 
 THICKNESS, EXTINCTION = 143.7, 0.0363
 TURN = rotation((0.3, 1.0, -0.2), 11.0)

@@ -9,17 +9,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import realtime.clouds.canonical.transport_grid as grid
-from realtime.clouds.canonical import coordinates
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.methods.registry import METHODS
-from realtime.scene.camera import ray_directions
-from realtime.scene.read_scene import read_scene
+import airlight.realtime.clouds.canonical.transport_grid as grid
+from airlight.realtime.clouds.canonical import coordinates
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.camera import ray_directions
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import box, placed
+from airlight.validation.scenes.parts import camera
+from airlight.validation.slab.radiance import slab_radiance
 from tests.helpers.clouds import DROPLETS, cloud
-from validation.scenes.meshes import box, placed
-from validation.scenes.parts import camera
-from validation.slab.radiance import slab_radiance
 
 THICKNESS, EXTINCTION, G, ALBEDO = 110.3, 0.0363, 0.85, 0.99
 AXIS = np.array([0.517, 0.211, -0.829]) / np.linalg.norm([0.517, 0.211, -0.829])

@@ -8,19 +8,19 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.canonical.coordinates import OPACITY
-from realtime.errors import InputError
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import frame_renderer, image_frame, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import FOG_METHODS, METHODS
-from realtime.scene.animate import thicker_medium
-from realtime.scene.camera import ray_directions
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.clouds.canonical.coordinates import OPACITY
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import FOG_METHODS, METHODS
+from airlight.realtime.scene.animate import thicker_medium
+from airlight.realtime.scene.camera import ray_directions
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import box, grid, placed
+from airlight.validation.scenes.parts import mitsuba_mesh
 from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, loaded, ring
 from tests.helpers.frames import render
-from validation.scenes.meshes import box, grid, placed
-from validation.scenes.parts import mitsuba_mesh
 
 pytestmark = pytest.mark.usefixtures("variant")
 

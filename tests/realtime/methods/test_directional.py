@@ -7,13 +7,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.shadow_maps.shadow_map import cast_shadow_map
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.meshes import box, placed
+from airlight.validation.scenes.parts import mitsuba_mesh
 from tests.helpers import airlight_sum
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.sunlit import ALONG, CUBE_AT, SIDES, TURN, plank, rays, shaded, sun, unit
-from validation.estimates.quadrature import reference_image
-from validation.scenes.meshes import box, placed
-from validation.scenes.parts import mitsuba_mesh
 
 
 def solid_box(sides, centre) -> Any:

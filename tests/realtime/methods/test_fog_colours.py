@@ -4,16 +4,16 @@
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import METHODS
-from realtime.scene.read_scene import read_scene
-from reference.quadrature.image import quadrature_image
-from reference.scene.camera import film_directions, pixel_centres
-from reference.scene.read import read_reference
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.camera import film_directions, pixel_centres
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.height_fog import LAMP, SUN, fog_xml
-from validation.scenes.loading import load_scene
 
 SKY = '<emitter type="constant" id="sky"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>'
 DARK = SUN.replace("3, 2.6, 2.1", "0, 0, 0")

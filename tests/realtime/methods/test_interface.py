@@ -9,17 +9,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import frame_renderer, image_frame, render_frame
-from realtime.methods.interface.method import Layers
-from realtime.scene.animate import coloured_light
-from realtime.scene.media.medium import Medium
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
+from airlight.realtime.methods.interface.method import Layers
+from airlight.realtime.scene.animate import coloured_light
+from airlight.realtime.scene.media.medium import Medium
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers.frames import read, relative_rmse, render
 from tests.helpers.scenes import spot, tiny_scene
 from tests.helpers.veil import Veil
-from validation.study.configuration import configuration, prepared
 
 SIZE = 24, 16
 NAME = "tests.helpers.veil:Veil"

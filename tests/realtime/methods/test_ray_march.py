@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.scene.read import read_reference
+from airlight.reference.scene.read import read_reference
 from tests.helpers.frames import frame, relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 

@@ -9,14 +9,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError, NoDriverError
-from realtime.frame.incremental import next_frame
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.methods.registry import find_method
-from realtime.methods.shader.client import ShaderHost
-from realtime.methods.shader.source import Pass, read_shader
-from realtime.scene.camera import read_camera
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError, NoDriverError
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.methods.registry import find_method
+from airlight.realtime.methods.shader.client import ShaderHost
+from airlight.realtime.methods.shader.source import Pass, read_shader
+from airlight.realtime.scene.camera import read_camera
+from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.frames import reference_of, relative_rmse, render
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
 from tests.helpers.shaders import EXAMPLES, need_opengl

@@ -8,22 +8,22 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import find_method
-from realtime.numerics.recorded import Frozen
-from realtime.parameters import defaults
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import find_method
+from airlight.realtime.numerics.recorded import Frozen
+from airlight.realtime.parameters import defaults
+from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.scenes import tiny_scene
 
 SOURCE = """
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from realtime.errors import InputError
+from airlight.realtime.errors import InputError
 from dataclasses import dataclass
-from realtime.methods.interface.method import Layers, Method
+from airlight.realtime.methods.interface.method import Layers, Method
 
 NUMBER = 3
 
@@ -217,13 +217,6 @@ def test_faults_in_the_file_are_told_with_their_line(tmp_path, monkeypatch):
     for module in ("imports_for_tests", "imports_for_tests.py"):
         with refused("imports_for_tests.py, line 2: ModuleNotFoundError: No module named 'not_there_for_tests'"):
             find_method(f"{module}:f")
-
-
-@pytest.mark.claim("own-method-frozen")
-def test_a_package_that_has_the_name_of_one_of_ours_is_named(tmp_path):
-    (tmp_path / "mine.py").write_text("from realtime.numbers import strength\n")
-    with pytest.raises(InputError, match="has a package 'realtime' itself, which was found first: rename yours"):
-        find_method(f"{tmp_path / 'mine.py'}:fog")
 
 
 def test_loading_leaves_nothing_beside_the_file(tmp_path, monkeypatch):

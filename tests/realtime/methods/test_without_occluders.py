@@ -6,14 +6,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import frame_renderer, run_cast_and_shade, run_method, run_stages
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import FOG_METHODS, METHODS
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.frame.renderer import frame_renderer, run_cast_and_shade, run_method, run_stages
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import FOG_METHODS, METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import Configuration, prepared
 from tests.helpers.lamps import lamp
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.loading import load_scene
-from validation.study.configuration import Configuration, prepared
 
 #: How methods that march resolve this light.
 SETTINGS = {

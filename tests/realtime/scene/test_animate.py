@@ -5,15 +5,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import render_frame
-from realtime.scene.animate import coloured_light, read_objects, turned_light, turned_objects
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.animate import coloured_light, read_objects, turned_light, turned_objects
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import grid, icosphere, rotation
+from airlight.validation.scenes.parts import mitsuba_mesh
+from airlight.validation.study.configuration import configuration, prepared
+from airlight.validation.study.growth import bumpy
 from tests.helpers.clouds import cloud, cloud_scene, ring
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.meshes import grid, icosphere, rotation
-from validation.scenes.parts import mitsuba_mesh
-from validation.study.configuration import configuration, prepared
-from validation.study.growth import bumpy
 
 
 def host(array) -> np.ndarray:

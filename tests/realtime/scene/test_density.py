@@ -6,17 +6,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer
-from realtime.kernels.registry import KERNELS
-from realtime.memory import Memory
-from realtime.methods.registry import FOG_METHODS, METHODS
-from realtime.numerics.array_types import array_types
-from realtime.scene.closed_mesh import closed_mesh, encloses
-from realtime.scene.density import DensityGrid, density_at, density_on_device, read_density
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.memory import Memory
+from airlight.realtime.methods.registry import FOG_METHODS, METHODS
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.scene.closed_mesh import closed_mesh, encloses
+from airlight.realtime.scene.density import DensityGrid, density_at, density_on_device, read_density
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import box, joined, placed, torus
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, cloud_of, cloud_scene, dense, linear_between, loaded, ring
-from validation.scenes.meshes import box, joined, placed, torus
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -90,7 +90,7 @@ def test_the_transform_of_a_turned_grid_is_measured_and_its_grid_left_as_it_was(
 
 @pytest.mark.parametrize(("side", "words"), [(1024, "1073741824 voxels in all; expected fewer"), (300, "GB of memory")])
 def test_grids_that_nothing_can_hold_are_refused_before_they_are_copied(monkeypatch, side, words):
-    monkeypatch.setattr("realtime.memory.usable_memory", lambda: Memory(10**9, "this machine has"))
+    monkeypatch.setattr("airlight.realtime.memory.usable_memory", lambda: Memory(10**9, "this machine has"))
     voxel = np.broadcast_to(np.float32(1), (side, side, side))  # one number in memory
     grid = DensityGrid(voxel, 1.0, np.eye(3, 4))
     with pytest.raises(InputError, match=words):

@@ -7,11 +7,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.methods.registry import METHODS
-from realtime.scene.mesh_adjacency import make_occluders, read_occluders
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.mesh_adjacency import make_occluders, read_occluders
+from airlight.realtime.scene.read_scene import read_scene
 from tests.helpers.occluders import AWKWARD, SOUND, closed_sphere
 from tests.helpers.scenes import tiny_scene
 

@@ -5,11 +5,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.droplets import Droplets, Modified, optics
-from analytic.phase import PhaseFunction, phase_from_words
-from realtime.droplets import droplet_series, fraction_cut
-from realtime.errors import InputError
-from realtime.scene.phase import named_phase
+from airlight.analytic.droplets import Droplets, Modified, optics
+from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.realtime.droplets import droplet_series, fraction_cut
+from airlight.realtime.errors import InputError
+from airlight.realtime.scene.phase import named_phase
 
 
 def phases():

@@ -8,16 +8,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.renderer import render_frame
-from realtime.numerics.array_types import array_types
-from realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
-from realtime.scene.read_scene import read_scene
-from realtime.scene.rounding import check_rounding
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.scene.rounding import check_rounding
+from airlight.validation.scenes.height_fog import register_height_fog
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
-from validation.scenes.height_fog import register_height_fog
-from validation.scenes.loading import load_scene
-from validation.study.configuration import configuration, prepared
 
 
 def read(**changes):

@@ -8,11 +8,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.monte_carlo.batches import merged
-from reference.monte_carlo.single_scatter.area_sampling import emitting
-from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath import volpath_batch
-from reference.scene.read import read_reference
+from airlight.reference.monte_carlo.batches import merged
+from airlight.reference.monte_carlo.single_scatter.area_sampling import emitting
+from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.scene.read import read_reference
 from tests.helpers.area_lights import BLACK, NULL, lamp, lit_scene, ring
 from tests.helpers.scenes import tiny_scene
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference.monte_carlo.batches import (
+from airlight.reference.monte_carlo.batches import (
     EQUAL,
     LARGEST_SEED,
     LAYERS,
@@ -18,8 +18,8 @@ from reference.monte_carlo.batches import (
     seed_ranges,
     single_batch,
 )
-from reference.monte_carlo.volpath import volpath_batch
-from reference.scene.read import read_reference
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.scene.read import read_reference
 from tests.helpers.scenes import tiny_scene
 
 

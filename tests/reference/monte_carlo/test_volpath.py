@@ -6,11 +6,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.monte_carlo.batches import merged
-from reference.monte_carlo.volpath import volpath_batch
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
-from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.reference.monte_carlo.batches import merged
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.suns import brick, pearl
 from tests.reference.monte_carlo.single_scatter.test_integrator import COLOURED, HG, MEDIA

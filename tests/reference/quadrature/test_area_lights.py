@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 from scipy.special import roots_legendre
 
-from reference.quadrature import area_lights
-from reference.quadrature.area_lights import area_surface, beams_of
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.light_samples import samples_for_rays, sections_for_points
-from reference.quadrature.replicates import REPLICATES, PointPlan, square_points, standard_error
-from reference.quadrature.shared_samples import shared_samples
-from reference.quadrature.surface import Reflection, surface_hits
-from reference.scene.read import read_reference
-from reference.visibility.certificate import segments_blocked
-from reference.visibility.distances import exact_distance
-from reference.visibility.lit_intervals import before_light
+from airlight.reference.quadrature import area_lights
+from airlight.reference.quadrature.area_lights import area_surface, beams_of
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.light_samples import samples_for_rays, sections_for_points
+from airlight.reference.quadrature.replicates import REPLICATES, PointPlan, square_points, standard_error
+from airlight.reference.quadrature.shared_samples import shared_samples
+from airlight.reference.quadrature.surface import Reflection, surface_hits
+from airlight.reference.scene.read import read_reference
+from airlight.reference.visibility.certificate import segments_blocked
+from airlight.reference.visibility.distances import exact_distance
+from airlight.reference.visibility.lit_intervals import before_light
+from airlight.validation.scenes.meshes import grid, icosphere, placed, scaled
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers.area_lights import (
     GREY,
@@ -36,7 +37,6 @@ from tests.helpers.area_lights import (
     ring,
     turned,
 )
-from validation.scenes.meshes import grid, icosphere, placed, scaled
 
 WHITE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1.0, 1.0, 1.0]}}
 LAMPS = {"rectangle": flat, "disk": partial(flat, "disk"), "sphere": ball}

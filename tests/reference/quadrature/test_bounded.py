@@ -7,9 +7,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import ray_values
-from reference.scene.read import read_reference
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.ray_values import ray_values
+from airlight.reference.scene.read import read_reference
 from tests.helpers.scenes import clear_scene, tiny_scene
 from tests.helpers.suns import BRICK, CHORDS, brick, pearl, plain_airlight, sun, sunny
 

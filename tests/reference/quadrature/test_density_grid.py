@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, simpson
 
-from analytic.errors import InputError
-from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath import volpath_batch
-from reference.quadrature.fields import field_of
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
-from reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.analytic.errors import InputError
+from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.quadrature.fields import field_of
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.validation.scenes.loading import load_scene
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
 from tests.helpers.clouds import linear_between
 from tests.helpers.density_grid import ALBEDO, HIGH, INSIDE, LOW, ROUGH, SCALE, SHAPES, SPOT, grid_xml, volume
 from tests.helpers.height_fog import LAMP, SUN
-from validation.scenes.loading import load_scene
 
 BATCHES = 40
 
@@ -178,13 +178,13 @@ def test_other_grids_are_refused_by_name(reference, tmp_path, how, words):
 #: Faults that the comparison with volpath must find, by name.
 FAULTS = {
     "values at the corners of voxels": Wrap(
-        "reference.scene.varying:GridMedium.voxels", lambda function, self, point: function(self, point) + 0.5
+        "airlight.reference.scene.varying:GridMedium.voxels", lambda function, self, point: function(self, point) + 0.5
     ),
     "no attenuation on the way from the light": Wrap(
-        "reference.quadrature.cell_walk:CellWalk.leave", lambda function, *others: 0 * function(*others)
+        "airlight.reference.quadrature.cell_walk:CellWalk.leave", lambda function, *others: 0 * function(*others)
     ),
     "cells as thick as their first place": Wrap(
-        "reference.quadrature.cell_walk:CellWalk.within",
+        "airlight.reference.quadrature.cell_walk:CellWalk.within",
         lambda function, self, origin, way, x0, x1: (x1 - x0) * self.density(origin + way * (x0 + 1e-6)),
     ),
 }

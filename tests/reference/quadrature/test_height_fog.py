@@ -6,18 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analytic.height_fog import HeightFog
-from reference.monte_carlo.volpath import volpath_batch
-from reference.quadrature.height_fog import fog_of
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.replicates import PointPlan
-from reference.scene.read import ReferenceMedium, read_reference
-from reference.scene.shadow_epsilon import measure_shadow_epsilon
-from reference.scene.varying import HeightMedium
+from airlight.analytic.height_fog import HeightFog
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.scene.read import ReferenceMedium, read_reference
+from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.reference.scene.varying import HeightMedium
+from airlight.validation.scenes.loading import load_scene
 from tests.evidence.injected import Wrap, injected
 from tests.helpers.biases import biases
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
-from validation.scenes.loading import load_scene
 
 PANEL = """<shape type="rectangle" id="panel">
     <transform name="to_world"><scale value="0.7"/><lookat origin="2, -2, 5" target="0, 0, 1" up="0, 1, 0"/></transform>
@@ -78,19 +78,21 @@ def test_bounds_are_below_a_millionth_of_the_mean(scene):
 #: Faults that the comparison with volpath must find, by name.
 FAULTS = {
     "height of the wrong light path": Wrap(
-        "analytic.height_fog:height_fog_segments",
+        "airlight.analytic.height_fog:height_fog_segments",
         lambda function, fog, rays, *others, **named: function(fog, replace(rays, light=rays.origin), *others, **named),
     ),
-    "1/H for H": Wrap("reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: 1 / h)),
+    "1/H for H": Wrap(
+        "airlight.reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: 1 / h)
+    ),
     "ln 2 left out": Wrap(
-        "reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: h * np.log(2))
+        "airlight.reference.scene.varying:read_height_fog", lambda f, *a: _scale_heights(f(*a), lambda h: h * np.log(2))
     ),
     "density at the camera for the mean": Wrap(
-        "analytic.height_fog:HeightFog.optical_depth",
+        "airlight.analytic.height_fog:HeightFog.optical_depth",
         lambda function, self, start, end, length: self.density(start) * length,
     ),
     "the sun's path without its cosine": Wrap(
-        "analytic.height_fog:height_fog_sun",
+        "airlight.analytic.height_fog:height_fog_sun",
         lambda function, fog, *others, sun, phase: function(_flat(fog, sun), *others, sun=sun, phase=phase),
     ),
 }

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import ray_values
-from reference.quadrature.replicates import PointPlan, standard_error
-from reference.scene.camera import film_directions
-from reference.scene.read import read_reference
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.ray_values import ray_values
+from airlight.reference.quadrature.replicates import PointPlan, standard_error
+from airlight.reference.scene.camera import film_directions
+from airlight.reference.scene.read import read_reference
 from tests.helpers.polygons import box_scene
 from tests.helpers.scenes import spot, tiny_scene
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm, skew
 
-from reference.quadrature.area_lights import area_surface, beams_of
-from reference.quadrature.replicates import (
+from airlight.reference.quadrature.area_lights import area_surface, beams_of
+from airlight.reference.quadrature.replicates import (
     PILOT,
     REPLICATES,
     PointPlan,
@@ -20,8 +20,8 @@ from reference.quadrature.replicates import (
     replicate_means,
     standard_error,
 )
-from reference.quadrature.surface import surface_hits
-from reference.visibility.distances import exact_distance
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.visibility.distances import exact_distance
 from tests.evidence.closed_forms import sphere_airlight
 from tests.helpers.area_lights import GREY, airlight_replicates, fixed, fog, lamp, lit_room, turned
 

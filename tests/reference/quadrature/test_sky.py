@@ -6,13 +6,13 @@ import pytest
 from scipy.integrate import cumulative_simpson, quad, simpson
 from scipy.special import expn
 
-from analytic.errors import InputError
-from reference.monte_carlo.volpath import volpath_batch
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.replicates import PointPlan
-from reference.scene.read import read_reference
+from airlight.analytic.errors import InputError
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.height_fog import LAMP
-from validation.scenes.loading import load_scene
 
 SKY = '<emitter type="constant" id="sky"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>'
 RADIANCE, ALBEDO = np.array([0.2, 0.3, 0.4]), 0.83

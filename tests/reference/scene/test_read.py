@@ -6,21 +6,21 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.scene.camera import ray_directions
-from realtime.scene.read_scene import read_scene
-from reference.scene.area_light import triangle_normals
-from reference.scene.camera import film_positions, pixel_centres
-from reference.scene.clouds import read_clouds
-from reference.scene.read import read_reference
-from reference.scene.shadow_epsilon import measure_shadow_epsilon
-from reference.scene.shapes import read_shapes
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.camera import ray_directions
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.area_light import triangle_normals
+from airlight.reference.scene.camera import film_positions, pixel_centres
+from airlight.reference.scene.clouds import read_clouds
+from airlight.reference.scene.read import read_reference
+from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.reference.scene.shapes import read_shapes
+from airlight.validation.scenes import meshes
+from airlight.validation.scenes.meshes import icosphere, placed, torus
+from airlight.validation.scenes.parts import camera, fog, medium_boundary, mitsuba_mesh, point_light, sky, sun
 from tests.helpers.area_lights import NULL, lamp, lit_scene, mesh_lamp
 from tests.helpers.lamps import area_lamp
 from tests.helpers.scenes import spot, tiny_scene
-from validation.scenes import meshes
-from validation.scenes.meshes import icosphere, placed, torus
-from validation.scenes.parts import camera, fog, medium_boundary, mitsuba_mesh, point_light, sky, sun
 
 
 def test_both_sides_read_the_same_scene(variant):

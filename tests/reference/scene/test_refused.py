@@ -7,16 +7,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.errors import InputError as MethodsInputError
-from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_reference
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as MethodsInputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.meshes import box, prism, star
+from airlight.validation.scenes.numbers import check_numbers
+from airlight.validation.scenes.parts import medium_boundary, point_light
 from tests.helpers.lamps import area_lamp
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.suns import sun
-from validation.scenes.meshes import box, prism, star
-from validation.scenes.numbers import check_numbers
-from validation.scenes.parts import medium_boundary, point_light
 
 FOG = {"type": "homogeneous", "sigma_t": 0.2, "albedo": 0.5}
 CUBE, SPHERE, CLEAR = {"type": "cube"}, {"type": "sphere"}, {"bsdf": {"type": "null"}}

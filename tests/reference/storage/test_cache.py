@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.cache import (
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.cache import (
     DEFAULT_LIMIT,
     cache_entries,
     cache_folder,
@@ -22,7 +22,7 @@ from reference.storage.cache import (
     remove_oldest,
     store_arrays,
 )
-from reference.storage.files import (
+from airlight.reference.storage.files import (
     atomic_path,
     ensure_folder,
     write_bytes,
@@ -55,7 +55,7 @@ def test_a_killed_process_leaves_the_old_file_and_what_it_left_is_swept(tmp_path
     write_text(path, "old")
     script = (
         "import os, signal, sys\n"
-        "from reference.storage.files import atomic_path\n"
+        "from airlight.reference.storage.files import atomic_path\n"
         "with atomic_path(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -249,7 +249,7 @@ def test_clearing_leaves_what_is_not_of_the_cache(own_cache):
 _WRITER = """
 import sys
 import numpy as np
-from reference.storage.cache import load_arrays, store_arrays
+from airlight.reference.storage.cache import load_arrays, store_arrays
 for number in range(60):
     name = f"volpath-{int(sys.argv[1]):016x}{number // 4:016x}/{number % 4:06d}"
     store_arrays(name, {"a": np.full(1000, number, dtype=np.uint8)})

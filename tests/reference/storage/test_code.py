@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from reference.storage import code as module
-from reference.storage.code import code_digest, source_digest
-from reports.machine.driver_check import DriverInputs
-from validation.estimates.monte_carlo import VolpathInputs
-from validation.estimates.quadrature import ReferenceInputs
-from validation.kernels.rays import RayInputs
-from validation.study.scene import CheckInputs
+from airlight.reference.storage import code as module
+from airlight.reference.storage.code import code_digest, source_digest
+from airlight.reports.machine.driver_check import DriverInputs
+from airlight.validation.estimates.monte_carlo import VolpathInputs
+from airlight.validation.estimates.quadrature import ReferenceInputs
+from airlight.validation.kernels.rays import RayInputs
+from airlight.validation.study.scene import CheckInputs
 
 ROOT = str(Path(__file__).resolve().parents[3])
 
@@ -81,7 +81,7 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
         (other / path.relative_to(folder)).parent.mkdir(exist_ok=True)
         (other / path.relative_to(folder)).write_text(path.read_text())
     code = "import sys\nfrom pathlib import Path\nfrom reference.storage.code import code_digest, source_digest\n"
-    code += "print(code_digest([Path(sys.argv[1])]), source_digest('reference.storage.store'))"
+    code += "print(code_digest([Path(sys.argv[1])]), source_digest('airlight.reference.storage.store'))"
     command = [sys.executable, "-c", code, str(other / "mine.py")]
     ran = subprocess.run(
         command,
@@ -90,17 +90,17 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
         check=True,
         env=os.environ | {"PYTHONPATH": ROOT, "PYTHONHASHSEED": "7"},
     )
-    assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest("reference.storage.store")]
+    assert ran.stdout.split() == [code_digest([folder / "mine.py"]), source_digest("airlight.reference.storage.store")]
 
 
 @pytest.mark.parametrize(
     ("name", "file"),
     [
-        ("validation.papers.shadow_planes", "validation/scenes/fog.toml"),
-        ("validation.papers.shadow_planes", "validation/papers/claims.toml"),
-        ("validation.study.growth", "validation/study/studies/methods.toml"),
-        ("validation.kernels.stability", "validation/certified/airlight_integral.csv"),
-        ("validation.study.run", "realtime/numerics/blue_noise.npy"),
+        ("airlight.validation.papers.shadow_planes", "validation/scenes/fog.toml"),
+        ("airlight.validation.papers.shadow_planes", "validation/papers/claims.toml"),
+        ("airlight.validation.study.growth", "validation/study/studies/methods.toml"),
+        ("airlight.validation.kernels.stability", "validation/certified/airlight_integral.csv"),
+        ("airlight.validation.study.run", "realtime/numerics/blue_noise.npy"),
     ],
 )
 def test_the_data_that_code_reads_count_with_it(monkeypatch, name, file):
@@ -116,12 +116,12 @@ def test_the_data_that_code_reads_count_with_it(monkeypatch, name, file):
 
 #: Modules that compute by the kind of their results, and one on whose numbers each depends.
 COMPUTED = {
-    "quadrature": (ReferenceInputs.__module__, "reference.quadrature.segments"),
-    "volpath": (VolpathInputs.modules[0], "reference.scene.read"),
-    "kernel-rays": (RayInputs.__module__, "analytic.panels"),
-    "row": ("validation.study.run", "realtime.methods.ray_march"),
-    "scene-checks": (CheckInputs.__module__, "validation.statistics.comparison"),
-    "shader-driver": (DriverInputs.__module__, "realtime.export.text"),
+    "quadrature": (ReferenceInputs.__module__, "airlight.reference.quadrature.segments"),
+    "volpath": (VolpathInputs.modules[0], "airlight.reference.scene.read"),
+    "kernel-rays": (RayInputs.__module__, "airlight.analytic.panels"),
+    "row": ("airlight.validation.study.run", "airlight.realtime.methods.ray_march"),
+    "scene-checks": (CheckInputs.__module__, "airlight.validation.statistics.comparison"),
+    "shader-driver": (DriverInputs.__module__, "airlight.realtime.export.text"),
 }
 
 
@@ -133,7 +133,8 @@ def closure(name):
         if path not in modules:
             modules.add(path)
             waiting += module._imported(path, module._compiled(path, path.stat().st_mtime_ns)[1])
-    return {".".join(path.relative_to(module._ROOT).with_suffix("").parts) for path in modules}
+    parts = (path.relative_to(module._ROOT).with_suffix("").parts for path in modules)
+    return {".".join(("airlight", *names)) for names in parts}
 
 
 @pytest.mark.claim("report-kept")
@@ -141,7 +142,7 @@ def test_results_hang_on_the_code_that_computes_them_and_not_on_claims_of_papers
     for kind, (name, needed) in COMPUTED.items():
         names = closure(name)
         assert needed in names, kind
-        apart = ("validation.papers", "reports.commands", "reports.papers", "reports.tables")
+        apart = ("airlight.validation.papers", "airlight.reports.commands", "airlight.reports.papers", "airlight.reports.tables")
         assert not [each for each in names if each.startswith(apart)], kind
 
 
@@ -149,7 +150,7 @@ def test_results_hang_on_the_code_that_computes_them_and_not_on_claims_of_papers
 @pytest.mark.parametrize("kind", ["quadrature", "row"])
 def test_a_change_of_the_code_throws_results_away_and_a_comment_does_not(monkeypatch, kind):
     name, needed = COMPUTED[kind]
-    file = module._ROOT.joinpath(*needed.split(".")).with_suffix(".py")
+    file = module._ROOT.joinpath(*needed.split(".")[1:]).with_suffix(".py")
     compiled, source = module._compiled, module._source
     before = source_digest(name)
 

@@ -4,8 +4,8 @@ import resource
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, layer, read_exr, write_exr
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, layer, read_exr, write_exr
 
 SIZE = (5, 7)
 

@@ -10,9 +10,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.storage.scene_digest import build_scene, is_whole, scene_digest
+from airlight.reference.storage.scene_digest import build_scene, is_whole, scene_digest
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.scenes import spot, tiny_scene
-from validation.scenes.loading import load_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -167,7 +167,7 @@ def test_digest_is_the_same_at_every_load_and_in_another_process(variant):
     assert scene_digest(first) == scene_digest(second)
     script = (
         "import sys, mitsuba as mi; mi.set_variant(sys.argv[1])\n"
-        "from reference.storage.scene_digest import scene_digest\n"
+        "from airlight.reference.storage.scene_digest import scene_digest\n"
         "print(scene_digest(mi.load_string(sys.argv[2])))"
     )
     environment = os.environ | {"PYTHONHASHSEED": "4711", "PYTHONPATH": str(ROOT)}

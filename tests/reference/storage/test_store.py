@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analytic.clock import Spent
-from reference.storage import store as module
-from reference.storage.cache import cache_folder
-from reference.storage.scene_digest import scene_content
-from reference.storage.store import (
+from airlight.analytic.clock import Spent
+from airlight.reference.storage import store as module
+from airlight.reference.storage.cache import cache_folder
+from airlight.reference.storage.scene_digest import scene_content
+from airlight.reference.storage.store import (
     Content,
     Inputs,
     add_spent,
@@ -35,18 +35,25 @@ from reference.storage.store import (
     store,
     stored,
 )
-from reports.machine.driver_check import DriverInputs
-from reports.report.others import PaperInputs, ScalingInputs, StabilityInputs
+from airlight.reports.machine.driver_check import DriverInputs
+from airlight.reports.report.others import PaperInputs, ScalingInputs, StabilityInputs
+from airlight.validation.estimates.monte_carlo import CloudPathInputs, SingleScatterInputs, VolpathInputs
+from airlight.validation.estimates.quadrature import ReferenceInputs
+from airlight.validation.kernels.rays import RayInputs, table
+from airlight.validation.study.configuration import Configuration
+from airlight.validation.study.keys import CellReference, RowInputs
+from airlight.validation.study.reference import SampledInputs
+from airlight.validation.study.scene import (
+    CellInputs,
+    CheckInputs,
+    FlipInputs,
+    ImageInputs,
+    MultipleInputs,
+    TimesInputs,
+)
+from airlight.validation.study.study import Cell, Checks, Measure, standard_study
+from airlight.validation.timing import Timing
 from tests.helpers.scenes import tiny_scene
-from validation.estimates.monte_carlo import CloudPathInputs, SingleScatterInputs, VolpathInputs
-from validation.estimates.quadrature import ReferenceInputs
-from validation.kernels.rays import RayInputs, table
-from validation.study.configuration import Configuration
-from validation.study.keys import CellReference, RowInputs
-from validation.study.reference import SampledInputs
-from validation.study.scene import CellInputs, CheckInputs, FlipInputs, ImageInputs, MultipleInputs, TimesInputs
-from validation.study.study import Cell, Checks, Measure, standard_study
-from validation.timing import Timing
 
 pytestmark = pytest.mark.usefixtures("own_cache")
 
@@ -99,7 +106,7 @@ def test_what_was_computed_is_found_again_and_fresh_results_are_not_older_than_t
         assert not page(inputs, calls).loaded
         assert page(inputs, calls).loaded  # computed in this run
         # Another process of the run does the same.
-        code = f"from reference.storage.store import *\nprint(is_kept('{inputs.key}'), fresh_since())"
+        code = f"from airlight.reference.storage.store import *\nprint(is_kept('{inputs.key}'), fresh_since())"
         environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
         ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
         assert ran.stdout.split() == ["True", repr(fresh_since())]

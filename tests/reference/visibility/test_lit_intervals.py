@@ -8,18 +8,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import reference.quadrature.light_airlight as light_airlight
-import reference.quadrature.ray_values as quadrature
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import ReferenceLight, read_reference
-from reference.scene.shapes import Disks, Shapes
-from reference.visibility.candidates import Ball, near_shapes
-from reference.visibility.certificate import EXACT_EDGE, certified, segments_blocked
-from reference.visibility.lit_intervals import Obstacles, lit_intervals, reaches
-from reference.visibility.planes import cone_interval, falloff, rays_at
+import airlight.reference.quadrature.light_airlight as light_airlight
+import airlight.reference.quadrature.ray_values as quadrature
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import ReferenceLight, read_reference
+from airlight.reference.scene.shapes import Disks, Shapes
+from airlight.reference.visibility.candidates import Ball, near_shapes
+from airlight.reference.visibility.certificate import EXACT_EDGE, certified, segments_blocked
+from airlight.reference.visibility.lit_intervals import Obstacles, lit_intervals, reaches
+from airlight.reference.visibility.planes import cone_interval, falloff, rays_at
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.polygons import box_scene, rays_of
 from tests.helpers.scenes import spot, tiny_scene
-from validation.scenes.loading import load_scene
 
 
 def unit(vector):

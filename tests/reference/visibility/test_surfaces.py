@@ -5,12 +5,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_reference
-from reference.scene.shapes import read_shapes
-from reference.visibility.certificate import reached_by_shadow_rays, segments_blocked
-from reference.visibility.distances import exact_distance
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.read import read_reference
+from airlight.reference.scene.shapes import read_shapes
+from airlight.reference.visibility.certificate import reached_by_shadow_rays, segments_blocked
+from airlight.reference.visibility.distances import exact_distance
 from tests.helpers.scenes import tiny_scene
 
 

@@ -9,18 +9,24 @@ import numpy as np
 import pytest
 
 import airlight
-from reports.studies.registry import STUDIES
+from airlight.reports.studies.registry import STUDIES
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.registry import SCENES
 from tests.helpers.api import TINY, brighter, third
-from validation.estimates.quadrature import reference_image
-from validation.scenes.registry import SCENES
 
 
 def gone(view):
     raise ZeroDivisionError("nothing there")
 
 
-MODULES = ["airlight", "reports.api.render", "reports.api.compare", "reports.api.reference", "reports.studies.registry"]
-MODULES += [f"reports.studies.{module}" for module in sorted({*STUDIES.values()})]
+MODULES = [
+    "airlight",
+    "airlight.reports.api.render",
+    "airlight.reports.api.compare",
+    "airlight.reports.api.reference",
+    "airlight.reports.studies.registry",
+]
+MODULES += [f"airlight.reports.studies.{module}" for module in sorted({*STUDIES.values()})]
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -51,7 +57,7 @@ def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
 
 
 def test_a_frame_is_that_of_the_parts_it_is_made_of(variant):
-    from validation.study.configuration import configuration, prepared
+    from airlight.validation.study.configuration import configuration, prepared
 
     frame = airlight.render("sphere-spot", "shadow-planes", "quadrature-32", size=TINY, order="paper")
     scene = airlight.read_scene(airlight.load_scene("sphere-spot", TINY).scene)

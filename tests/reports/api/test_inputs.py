@@ -5,12 +5,20 @@ import numpy as np
 import pytest
 
 import airlight
-from realtime.errors import InputError as RealtimeInputError
-from realtime.errors import NoDriverError
-from reports.api.inputs import changes_of, configuration_of, kernel_name, one_error, output_files, pixels_of, telling
-from reports.machine.environment import MissingError
+from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.realtime.errors import NoDriverError
+from airlight.reports.api.inputs import (
+    changes_of,
+    configuration_of,
+    kernel_name,
+    one_error,
+    output_files,
+    pixels_of,
+    telling,
+)
+from airlight.reports.machine.environment import MissingError
+from airlight.validation.study.configuration import configuration
 from tests.helpers.api import third
-from validation.study.configuration import configuration
 
 
 def test_changes_by_name_are_those_of_words():

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from PIL import Image as Picture
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, read_exr
-from reports.api.compare import compare
-from reports.api.results import Reference, RenderedFrames, Rendering, sealed, write_image
-from reports.plotting.pictures import tone_curve
-from reports.studies.methods import MethodsStudy
-from validation.estimates.images import MonteCarloReference, RelativeErrors
-from validation.study.row import Row
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, read_exr
+from airlight.reports.api.compare import compare
+from airlight.reports.api.results import Reference, RenderedFrames, Rendering, sealed, write_image
+from airlight.reports.plotting.pictures import tone_curve
+from airlight.reports.studies.methods import MethodsStudy
+from airlight.validation.estimates.images import MonteCarloReference, RelativeErrors
+from airlight.validation.study.row import Row
 
 
 def layered(scale=1.0, dtype=np.float32, **more):
@@ -154,7 +154,7 @@ def test_a_notebook_shows_all_light_and_the_airlight_where_that_is_another_pictu
     np.testing.assert_array_equal(shown["all light"], pixels(frame._repr_png_()))
     np.testing.assert_array_equal(shown["airlight"], frame.picture("airlight"))
     assert (shown["airlight"] < shown["all light"]).all()  # in the exposure of the total
-    monkeypatch.setattr("reports.tables.record._NARROW", 1)  # no picture is enlarged
+    monkeypatch.setattr("airlight.reports.tables.record._NARROW", 1)  # no picture is enlarged
     assert re.findall(r"inline-block;width:(\d+)px", frame._repr_html_()) == 2 * [str(frame.size[0])]
     assert "nothing written" not in frame._repr_html_()  # the command's words
     assert "&lt;made &amp; up&gt; by slow (steps=3)" in frame._repr_html_()

@@ -7,8 +7,8 @@ import mitsuba as mi
 import pytest
 
 import airlight
+from airlight.validation.scenes.registry import SCENES
 from tests.helpers.api import TINY
-from validation.scenes.registry import SCENES
 
 DARK = {
     "type": "scene",

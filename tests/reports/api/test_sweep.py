@@ -11,10 +11,10 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from reports.cluster.cells import row_without_numbers, times_of
-from reports.cluster.run import Outcome
-from reports.commands.main import run
-from validation.study.row import FRAME_MS
+from airlight.reports.cluster.cells import row_without_numbers, times_of
+from airlight.reports.cluster.run import Outcome
+from airlight.reports.commands.main import run
+from airlight.validation.study.row import FRAME_MS
 
 STUDY = """
 scenes = ["open-fog", "omni-box"]
@@ -56,8 +56,8 @@ class Workers:
 @pytest.fixture
 def workers(variant, tmp_path, monkeypatch):
     stub = Workers(tmp_path / "rows")
-    monkeypatch.setattr("reports.cluster.connect.connected", stub.connected)
-    monkeypatch.setattr("reports.cluster.run.run_groups", stub.run_groups)
+    monkeypatch.setattr("airlight.reports.cluster.connect.connected", stub.connected)
+    monkeypatch.setattr("airlight.reports.cluster.run.run_groups", stub.run_groups)
     monkeypatch.chdir(tmp_path)
     return stub
 
@@ -139,7 +139,7 @@ def test_rows_can_be_read_while_others_are_computed(sweep, workers, monkeypatch)
     (workers.folder / "rows.sqlite").unlink()
     (workers.folder / "sweep.parquet").unlink()
     workers.seen.clear()
-    monkeypatch.setattr("reports.api.sweep._EVERY", -1.0)
+    monkeypatch.setattr("airlight.reports.api.sweep._EVERY", -1.0)
     sweep()
     assert workers.seen == [True] * 4
 

@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from analytic.errors import InputError
-from reports import __version__
-from reports.cluster.connect import connected, parse_place
-from validation.study.keys import made_here
+from airlight.analytic.errors import InputError
+from airlight.reports import __version__
+from airlight.reports.cluster.connect import connected, parse_place
+from airlight.validation.study.keys import made_here
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from reports.cluster import connect
-from reports.cluster.run import Group, Task, run_groups
+from airlight.reports.cluster import connect
+from airlight.reports.cluster.run import Group, Task, run_groups
 from tests.helpers import cluster_tasks as tasks
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -7,11 +7,11 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from reports.cluster.connect import connected
-from reports.data.records import report_text
-from reports.report.measure import write_report
-from validation.study.configuration import configuration
-from validation.study.study import Checks, Measure, Study
+from airlight.reports.cluster.connect import connected
+from airlight.reports.data.records import report_text
+from airlight.reports.report.measure import write_report
+from airlight.validation.study.configuration import configuration
+from airlight.validation.study.study import Checks, Measure, Study
 
 #: Entries that depend on the clock, the memory or the cache: a cluster leaves the references.
 TIMES = {"created", "seconds", "parts", "measured", "stages", "times", "environment", "claims", "memory", "cost"}

@@ -11,8 +11,8 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from reports.cluster import connect
-from reports.cluster.run import Group, Task, run_groups
+from airlight.reports.cluster import connect
+from airlight.reports.cluster.run import Group, Task, run_groups
 from tests.helpers import cluster_tasks as tasks
 
 

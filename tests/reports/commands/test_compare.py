@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import airlight
-from reference.storage.exr import Image, read_exr, write_exr
-from reports.commands.main import run
-from validation.estimates.quadrature import reference_image
-from validation.scenes.loading import load_scene
+from airlight.reference.storage.exr import Image, read_exr, write_exr
+from airlight.reports.commands.main import run
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import load_scene
 
 SHAPE = (16, 20, 3)
 

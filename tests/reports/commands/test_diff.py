@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from reports.commands.main import run
-from reports.diff import compare
+from airlight.reports.commands.main import run
+from airlight.reports.diff import compare
 from tests.helpers.reports import agreement, checked, errors, method, report, slow_down
 
 

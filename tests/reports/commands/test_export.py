@@ -7,8 +7,8 @@ import re
 import pytest
 
 import airlight
-from reports.api.export import MEASURED
-from reports.commands.main import run
+from airlight.reports.api.export import MEASURED
+from airlight.reports.commands.main import run
 
 
 @pytest.mark.claim("exported-kernels")

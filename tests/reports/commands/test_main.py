@@ -9,11 +9,11 @@ import sys
 import pytest
 
 import airlight
-from analytic.errors import InputError
-from realtime.errors import InputError as RealtimeInputError
-from reports.commands import main as cli
-from reports.machine.environment import MissingError
-from reports.studies.registry import STUDIES
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.reports.commands import main as cli
+from airlight.reports.machine.environment import MissingError
+from airlight.reports.studies.registry import STUDIES
 
 _COMMANDS = [["study"], *(["study", name] for name in STUDIES)]
 _COMMANDS += [[cli._NAMES.get(each, each.__name__)] for several in cli._PANELS.values() for each in several]
@@ -192,8 +192,8 @@ def test_lists_have_one_command(capfd):
 
 
 def test_names_of_scenes_without_mitsuba_are_those_of_the_registry():
-    from reports.api.inputs import scene_names
-    from validation.scenes.registry import SCENES
+    from airlight.reports.api.inputs import scene_names
+    from airlight.validation.scenes.registry import SCENES
 
     assert list(scene_names()) == sorted(SCENES)
 

@@ -15,10 +15,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from realtime.methods.registry import METHODS
-from reference.storage.exr import read_exr
-from reports.commands.main import run
-from reports.view.session import Session
+from airlight.realtime.methods.registry import METHODS
+from airlight.reference.storage.exr import read_exr
+from airlight.reports.commands.main import run
+from airlight.reports.view.session import Session
 from tests.helpers.kinds import HEIGHT, KINDS, WIDTH, write_kind
 
 FOG = tuple(name for name in METHODS if not METHODS[name].renders_clouds)

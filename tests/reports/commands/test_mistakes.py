@@ -6,8 +6,8 @@ import shlex
 import numpy as np
 import pytest
 
-from reference.storage.exr import Image, write_exr
-from reports.commands.main import WRONG_INPUT, run
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.reports.commands.main import WRONG_INPUT, run
 
 #: A line as one types it, and what its one line says: the culprit, and where there is one the nearest name.
 MISTAKES = (

@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from reports.commands import main as cli
-from reports.figures.papers import PaperFigure
-from reports.plotting.figure import new_figure
-from validation.papers import claims as papers
+from airlight.reports.commands import main as cli
+from airlight.reports.figures.papers import PaperFigure
+from airlight.reports.plotting.figure import new_figure
+from airlight.validation.papers import claims as papers
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_figures_are_drawn_into_the_folder_with_their_data(variant, experiments,
         return PaperFigure(lambda column: new_figure(1, 1), images, rows)
 
     shown = {"slab": (("bouthors",), make), "others": (("biri",), lambda quick, progress: pytest.fail("of another"))}
-    monkeypatch.setattr("reports.figures.papers._FIGURES", shown)
+    monkeypatch.setattr("airlight.reports.figures.papers._FIGURES", shown)
     folder = tmp_path / "figures"
     assert cli.run(["paper", "bouthors", "--quick", "--figures", str(folder)]) == 0
     names = ["slab.pdf", "slab.png", "slab-picture.exr", "slab.csv"]

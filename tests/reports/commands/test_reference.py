@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import validation.estimates.images
-import validation.estimates.monte_carlo
-from reference.monte_carlo.batches import single_batch
-from reference.storage.cache import cache_folder, load_arrays
-from reference.storage.exr import read_exr
-from reports.commands import main as cli
+import airlight.validation.estimates.images
+import airlight.validation.estimates.monte_carlo
+from airlight.reference.monte_carlo.batches import single_batch
+from airlight.reference.storage.cache import cache_folder, load_arrays
+from airlight.reference.storage.exr import read_exr
+from airlight.reports.commands import main as cli
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENE = ["sphere-spot", "--size", "8x6"]
@@ -40,7 +40,7 @@ def traced(variant, monkeypatch):
         # The standard deviation of a pixel is its mean, so that the image is known to 1/sqrt(144 batches).
         return single_batch(seed, samples, np.random.default_rng([seed, samples]).exponential(size=(2, 48, 3)))
 
-    monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", trace)
+    monkeypatch.setattr(airlight.validation.estimates.monte_carlo, "volpath_batch", trace)
     return stops
 
 
@@ -85,7 +85,7 @@ def test_target_error_is_reached_and_no_more(traced, tmp_path, capfd):
 
 
 def test_an_error_that_is_not_known_is_said_so_in_text_and_json(traced, tmp_path, capfd, monkeypatch):
-    monkeypatch.setattr(validation.estimates.images, "near_light", lambda reference, distance: distance > 0)
+    monkeypatch.setattr(airlight.validation.estimates.images, "near_light", lambda reference, distance: distance > 0)
     printed = summary(tmp_path / "a.exr", capfd, "--error", "0.02", status=1)
     errors = printed["how"]["errors"]
     assert (printed["relative_error"], errors["pooled"], errors["worst"]) == (None, None, None)
@@ -159,7 +159,7 @@ class Workers:
         return {"workers": {"one": {}, "two": {}}}
 
     def run_groups(self, cluster, groups, *, made):
-        from reports.cluster.run import _outcome
+        from airlight.reports.cluster.run import _outcome
 
         assert cluster is self
         for task in (task for group in groups for task in group.tasks):
@@ -182,9 +182,9 @@ def test_workers_compute_what_the_cache_lacks_and_the_file_is_the_same(
     """`tests/reports/commands/test_sweep.py` has the processes."""
     pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
     workers = Workers()
-    monkeypatch.setattr("reports.cluster.connect.connected", workers.connected)
-    monkeypatch.setattr("reports.cluster.references.run_groups", workers.run_groups)
-    monkeypatch.setattr("reports.cluster.references.facts", lambda: None)  # which takes long
+    monkeypatch.setattr("airlight.reports.cluster.connect.connected", workers.connected)
+    monkeypatch.setattr("airlight.reports.cluster.references.run_groups", workers.run_groups)
+    monkeypatch.setattr("airlight.reports.cluster.references.facts", lambda: None)  # which takes long
     run(tmp_path / "here.exr", *words, estimator=estimator)
     monkeypatch.setenv("AIRLIGHT_CACHE_DIR", str(tmp_path / "other"))
     for name in ("there", "again"):

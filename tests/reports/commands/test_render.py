@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import airlight
-import validation.study.turns
-from analytic.errors import InputError
-from reference.storage.exr import read_exr
-from reports.commands import main as cli
-from validation.study.cost import TIMED
+import airlight.validation.study.turns
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import read_exr
+from airlight.reports.commands import main as cli
+from airlight.validation.study.cost import TIMED
 
 SMALL = ["--size", "8x6"]
 
@@ -71,8 +71,8 @@ def test_a_configuration_is_rendered_as_its_words_are(variant):
 @pytest.mark.claim("render-says-what-it-wrote")
 def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, tmp_path, capfd, monkeypatch):
     timed = []
-    real = validation.study.turns.time_alone
-    monkeypatch.setattr("validation.study.turns.time_alone", lambda *given: timed.append(1) or real(*given))
+    real = airlight.validation.study.turns.time_alone
+    monkeypatch.setattr("airlight.validation.study.turns.time_alone", lambda *given: timed.append(1) or real(*given))
     layers, picture = str(tmp_path / "fog.exr"), str(tmp_path / "fog.png")
     run("open-fog", *SMALL, "--samples", "4", "-o", layers, "-o", picture)
     printed = capfd.readouterr().out
@@ -112,7 +112,7 @@ def test_a_frame_of_one_ray_a_pixel_has_the_further_layers_of_its_method_and_pay
         asked.append((frames, layers))
         raise InputError("enough")
 
-    monkeypatch.setattr("reports.api.render._ready", ready)
+    monkeypatch.setattr("airlight.reports.api.render._ready", ready)
     for samples, timed in ((1, False), (4, False), (1, True)):
         with pytest.raises(InputError, match="enough"):
             airlight.render("open-fog", "unshadowed", samples=samples, timed=timed)

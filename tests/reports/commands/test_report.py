@@ -6,8 +6,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from reference.storage.exr import Image, write_exr
-from reports.commands.main import run
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.reports.commands.main import run
 from tests.helpers.api import brighter
 from tests.helpers.reports import checked, report_of
 
@@ -16,7 +16,7 @@ print("at import")
 
 
 def half(view, *, kernel=None):
-    from realtime.methods.unshadowed import unshadowed
+    from airlight.realtime.methods.unshadowed import unshadowed
     return 0.5 * unshadowed(view, kernel=kernel)
 
 
@@ -68,7 +68,7 @@ def handed_on(monkeypatch):
         given.update(options, folder=folder, scenes=study.scenes, configurations=study.configurations)
         return checked(report_of([], claims=[{"kind": "image", "text": "`--full` has all.", "good": None}]))
 
-    monkeypatch.setattr("reports.report.measure.write_report", write)
+    monkeypatch.setattr("airlight.reports.report.measure.write_report", write)
     return given
 
 
@@ -128,10 +128,10 @@ def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on
 
 @pytest.mark.claim("methods-are-named-alike")
 def test_what_is_named_is_measured_alone_and_all_are_a_word(variant, mine, handed_on, capsys, monkeypatch):
-    from validation.study.configuration import QUICK
+    from airlight.validation.study.configuration import QUICK
 
     # `tests/reports/machine/test_own_process.py` has the process that imports it.
-    monkeypatch.setattr("reports.machine.own_process.in_own_process", lambda work, *given, **how: work(*given))
+    monkeypatch.setattr("airlight.reports.machine.own_process.in_own_process", lambda work, *given, **how: work(*given))
     assert run(["report", "--quick", "--method", "fog_of_mine:half"]) == 0
     assert [each[0] for each in _measured(handed_on)] == ["fog_of_mine:half"]
     assert "note: what --method names is measured alone; --method all adds" in capsys.readouterr().err
@@ -158,7 +158,7 @@ def test_a_report_ends_with_one_where_its_reference_is_not_confirmed(variant, mo
 
     studied = scene("fog", [entry("unshadowed (exact)")], agreement={"volpath airlight": agreement(equivalent)})
     made = checked(report_of([studied]))
-    monkeypatch.setattr("reports.report.measure.write_report", lambda folder, study, **options: made)
+    monkeypatch.setattr("airlight.reports.report.measure.write_report", lambda folder, study, **options: made)
     assert run(["report", "open-fog", "--method", "unshadowed"]) == status
     assert "error:" not in capsys.readouterr().err
 
@@ -217,7 +217,7 @@ def test_workers_of_a_cluster_are_handed_on_while_the_report_is_made(variant, tm
         yield f"client of {place}"
         open_places.remove(place)
 
-    monkeypatch.setattr("reports.cluster.connect.connected", connected)
+    monkeypatch.setattr("airlight.reports.cluster.connect.connected", connected)
     assert run(["report", "open-fog", "--cluster", "local:3", "-o", str(tmp_path / "r")]) == 0
     assert handed_on["cluster"] == "client of 3"
     assert open_places == []
@@ -234,7 +234,7 @@ def test_a_page_is_drawn_in_its_place_with_the_figures_that_are_asked_for(tmp_pa
         asked.append((target, column, chosen))
         return (f"{target}/strip.pdf",)
 
-    monkeypatch.setattr("reports.figures.report.write_figures", write_figures)
+    monkeypatch.setattr("airlight.reports.figures.report.write_figures", write_figures)
     data = (folder / "report.json").read_bytes()
     words = ["hall", "--figures", "single", "--method", "good (k)"]
     assert run(["report", "--from", str(folder / "report.json"), *words]) == 0
@@ -268,7 +268,7 @@ def test_a_report_in_a_notebook_has_its_claims_and_leads_to_its_page(tmp_path, m
 def test_a_report_is_drawn_again_without_measuring(tmp_path, capsys):
     import json
 
-    from reports.data.records import named_files, report_text
+    from airlight.reports.data.records import named_files, report_text
     from tests.helpers.page import report_data, small_report, write_report_files
 
     folder = write_report_files(tmp_path / "r")

@@ -5,11 +5,11 @@ import json
 
 import pytest
 
-from realtime.methods.shader.client import ShaderHost
-from reports.commands import main as cli
-from reports.machine import driver_check
-from reports.machine.opengl import opengl_status, require_opengl
-from reports.report.claims import own_fault
+from airlight.realtime.methods.shader.client import ShaderHost
+from airlight.reports.commands import main as cli
+from airlight.reports.machine import driver_check
+from airlight.reports.machine.opengl import opengl_status, require_opengl
+from airlight.reports.report.claims import own_fault
 from tests.helpers.shaders import EXAMPLES, need_opengl
 
 MARCHER = str(EXAMPLES / "marcher.glsl")

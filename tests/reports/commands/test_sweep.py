@@ -13,8 +13,8 @@ import pytest
 
 pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
 
-from validation.study.row import FRAME_MS
-from validation.study.rows import ROWS, RowStore
+from airlight.validation.study.row import FRAME_MS
+from airlight.validation.study.rows import ROWS, RowStore
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -27,7 +27,7 @@ steps = [4, 9]
 [parameters.light-volumes]
 map = 32
 """
-COMMAND = [sys.executable, str(ROOT / "airlight.py"), "sweep"]
+COMMAND = [sys.executable, "-m", "airlight", "sweep"]
 
 
 def _run(*words, **options):
@@ -115,7 +115,7 @@ def test_a_reference_from_a_cluster_has_the_same_bytes(tmp_path, words):
     files = []
     for where in ([], ["--cluster", "local:2"]):
         file = tmp_path / f"{len(files)}.exr"
-        command = [sys.executable, str(ROOT / "airlight.py"), "reference", "sphere-spot", "--size", "16x12", *words]
+        command = [sys.executable, "-m", "airlight", "reference", "sphere-spot", "--size", "16x12", *words]
         environment = os.environ | {"AIRLIGHT_CACHE_DIR": str(tmp_path / f"cache-{len(files)}")}
         ran = subprocess.run(
             [*command, *where, "-o", str(file), "--json"], capture_output=True, text=True, timeout=900, env=environment

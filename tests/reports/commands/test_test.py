@@ -13,10 +13,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from reports.commands import main as cli
-from reports.commands import start
-from reports.commands import test as command
-from reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
+from airlight.reports.commands import main as cli
+from airlight.reports.commands import start
+from airlight.reports.commands import test as command
+from airlight.reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
 
 ROOT = Path(__file__).resolve().parents[3]
 PYTEST = [sys.executable, "-m", "pytest"]
@@ -41,7 +41,7 @@ def _own_environment(variant, monkeypatch, tmp_path):
     monkeypatch.setattr(os, "environ", {name: os.environ[name] for name in os.environ if name != VARIABLE})
     monkeypatch.setattr(os, "sysconf", memory.__getitem__)
     monkeypatch.setattr(os, "execv", replaced)
-    monkeypatch.setattr("reports.machine.environment.threads", lambda: 4)
+    monkeypatch.setattr("airlight.reports.machine.environment.threads", lambda: 4)
     monkeypatch.chdir(tmp_path)
 
 
@@ -61,7 +61,7 @@ def test_the_default_tier_is_shared_by_as_many_processes_as_have_memory_and_comp
 
 
 def test_one_core_is_one_process_and_full_compilation_stays_as_it_was_asked_for(monkeypatch):
-    monkeypatch.setattr("reports.machine.environment.threads", lambda: 1)
+    monkeypatch.setattr("airlight.reports.machine.environment.threads", lambda: 1)
     os.environ[VARIABLE] = "full"
     assert asked() == [*PYTEST, *DEFAULT]
     assert os.environ[VARIABLE] == "full"

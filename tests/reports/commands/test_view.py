@@ -13,8 +13,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from reports.commands import main as cli
-from reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
+from airlight.reports.commands import main as cli
+from airlight.reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
 
 ROOT = Path(__file__).resolve().parents[3]
 SMALL = ["--size", "16x12"]
@@ -40,7 +40,7 @@ def test_a_port_that_is_taken_is_said_and_the_reference_ends(variant, monkeypatc
     ended = []
     reference = SimpleNamespace(end=lambda: ended.append(True))
     session = SimpleNamespace(reference=reference, opened=None, told=None, closed=None)
-    monkeypatch.setattr("reports.view.session.Session", lambda state, variant: session)
+    monkeypatch.setattr("airlight.reports.view.session.Session", lambda state, variant: session)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -69,7 +69,7 @@ def _children(parent):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_it_and_its_processes_without_a_word(number):
     process = subprocess.Popen(
-        [sys.executable, str(ROOT / "airlight.py"), "view", "sphere-spot", *SMALL, "--set", "tolerance=0.01"],
+        [sys.executable, "-m", "airlight", "view", "sphere-spot", *SMALL, "--set", "tolerance=0.01"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

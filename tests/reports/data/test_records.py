@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from analytic.errors import InputError
-from reports.data.records import load_report, read_report
+from airlight.analytic.errors import InputError
+from airlight.reports.data.records import load_report, read_report
+from airlight.validation.study.study import standard_study
 from tests.helpers.page import report_data, write_report_files
-from validation.study.study import standard_study
 
 ROOT = Path(__file__).parents[3]
 

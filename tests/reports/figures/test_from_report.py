@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image as Picture
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, write_exr
-from reports.data.records import load_report
-from reports.figures import report as figures
-from reports.plotting.pictures import error_map, exposure, tone_mapped
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.reports.data.records import load_report
+from airlight.reports.figures import report as figures
+from airlight.reports.plotting.pictures import error_map, exposure, tone_mapped
 from tests.helpers.reports import (
     RUN,
     checked,
@@ -72,7 +72,7 @@ def report(tmp_path_factory):
 def test_drawing_again_only_reads_and_gives_the_same_bytes_without_mitsuba(report, tmp_path):
     """In another process, by the command; and what is embedded are TrueType fonts, no date."""
     program = (
-        "import sys; from reports.commands.main import run\n"
+        "import sys; from airlight.reports.commands.main import run\n"
         f"assert run(['report', '--from', {str(report)!r}, '-o', 'OUT', '--figures', 'single']) == 0\n"
         "assert not {'mitsuba', 'drjit'} & set(sys.modules), 'drawing started Mitsuba'\n"
     )

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from reports.interchange.gltf import write_gltf
-from reports.interchange.meshes import SIDES, shape_mesh
+from airlight.reports.interchange.gltf import write_gltf
+from airlight.reports.interchange.meshes import SIDES, shape_mesh
+from airlight.validation.scenes.loading import LoadedScene, load_scene
 from tests.helpers.area_lights import lamp
 from tests.helpers.scenes import spot, tiny_scene
-from validation.scenes.loading import LoadedScene, load_scene
 
 
 def loaded(**changes):

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 import airlight
-from reference.quadrature.height_fog import fog_of
-from reference.scene.read import read_reference
-from reports.commands.main import run
-from reports.interchange.fog_grid import fog_grid, write_fog_grid
-from reports.interchange.scene import describe_scene, spot_power_angle
+from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.scene.read import read_reference
+from airlight.reports.commands.main import run
+from airlight.reports.interchange.fog_grid import fog_grid, write_fog_grid
+from airlight.reports.interchange.scene import describe_scene, spot_power_angle
+from airlight.validation.scenes.loading import LoadedScene, load_scene
+from airlight.validation.scenes.registry import FOG_SCENES
 from tests.helpers.area_lights import lamp
 from tests.helpers.height_fog import LAMP, fog_xml
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
-from validation.scenes.loading import LoadedScene, load_scene
-from validation.scenes.registry import FOG_SCENES
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"
 cycles_properties = runpy.run_path(str(EXAMPLES / "cycles_properties.py"))["cycles_properties"]

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.storage.cache import store_arrays
-from reports.commands.main import run
-from reports.machine import doctor, environment, gpu, llvm
-from reports.machine.environment import MissingError, missing_packages, prepare
-from reports.machine.llvm import find_llvm
-from reports.machine.own_process import EndedError
+from airlight.reference.storage.cache import store_arrays
+from airlight.reports.commands.main import run
+from airlight.reports.machine import doctor, environment, gpu, llvm
+from airlight.reports.machine.environment import MissingError, missing_packages, prepare
+from airlight.reports.machine.llvm import find_llvm
+from airlight.reports.machine.own_process import EndedError
 
 ROOT = Path(__file__).resolve().parents[3]
 HEADER = Path(sys.executable).read_bytes()[:64]  # of a binary that suits this machine
@@ -203,7 +203,7 @@ def test_files_of_mitsuba_are_read_on_one_core(tmp_path):
     """With one thread Mitsuba waits for ever: a scene with a texture never came on a machine of one core."""
     code = (
         "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
-        "from reports.machine.environment import activate\n"
+        "from airlight.reports.machine.environment import activate\n"
         "activate()\n"
         "import mitsuba as mi, numpy as np\n"
         "mi.Bitmap(np.ones((3, 4, 3), np.float32)).write('one.exr')\n"

@@ -30,7 +30,7 @@ end_header
 )
 def test_json_is_all_that_is_printed(variant, tmp_path, monkeypatch, capfd, order):
     """The mesh is ASCII and long enough that Mitsuba warns of it; it has an isolated vertex and an empty triangle."""
-    from reports.commands.main import run
+    from airlight.reports.commands.main import run
 
     monkeypatch.chdir(tmp_path)
     name = order[0]  # each message is said once a process

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from analytic.errors import InputError
-from reports.machine.own_process import EndedError, in_own_process
+from airlight.analytic.errors import InputError
+from airlight.reports.machine.own_process import EndedError, in_own_process
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -66,7 +66,7 @@ def test_the_process_ends_with_the_one_that_started_it(variant, tmp_path, sign):
         f"    os.rename({str(tmp_path / 'half')!r}, {str(tmp_path / 'pids')!r})\n"
         "    while True:\n        pass\n"
     )
-    command = [sys.executable, "airlight.py", "render", "open-fog", "--size", "8x6", "--method", f"{method}:f"]
+    command = [sys.executable, "-m", "airlight", "render", "open-fog", "--size", "8x6", "--method", f"{method}:f"]
     process = subprocess.Popen(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     while not (tmp_path / "pids").exists() and process.poll() is None:
         time.sleep(0.05)

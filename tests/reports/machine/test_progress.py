@@ -4,15 +4,15 @@ from types import SimpleNamespace
 
 import pytest
 
-import reports.machine.progress
-from reports.machine.progress import progress_bar
+import airlight.reports.machine.progress
+from airlight.reports.machine.progress import progress_bar
 
 
 @pytest.fixture
 def clock(monkeypatch):
     """A clock of our own; `clock.now` is what it shows [s]."""
     clock = SimpleNamespace(now=100.0)
-    monkeypatch.setattr(reports.machine.progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    monkeypatch.setattr(airlight.reports.machine.progress, "time", SimpleNamespace(monotonic=lambda: clock.now))
     return clock
 
 

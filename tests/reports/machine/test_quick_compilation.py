@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from reports.machine.environment import prepare
-from reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
+from airlight.reports.machine.environment import prepare
+from airlight.reports.machine.quick_compilation import CACHE_VARIABLE, VARIABLE
 
 RENDER = """
 import hashlib, os
-from reports.machine.environment import activate
+from airlight.reports.machine.environment import activate
 activate("llvm_ad_rgb")
 import numpy as np
 import airlight

@@ -18,7 +18,7 @@ STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 HEAD = "import functools, sys, time\nfrom reports.machine.process_start import default_signals\ndefault_signals()\n"
 READY = "print('ready', flush=True)\n"
 KERNEL = """
-from reports.machine.environment import activate
+from airlight.reports.machine.environment import activate
 activate()
 import drjit as dr
 import mitsuba as mi
@@ -90,7 +90,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 def run(line, **environment):
     """Run a line of the shell in which $AIRLIGHT is the command."""
-    environment = os.environ | {"AIRLIGHT": f"{sys.executable} {ROOT / 'airlight.py'}"} | environment
+    environment = os.environ | {"AIRLIGHT": f"{sys.executable} -m airlight"} | environment
     return subprocess.run(["sh", "-c", line], capture_output=True, env=environment, timeout=120)
 
 
@@ -109,16 +109,16 @@ def test_closed_and_full_streams_are_no_fault(line, status):
 
 
 def test_a_file_does_not_take_the_place_of_a_closed_output(tmp_path):
-    code = "from reports.machine.process_start import usable_streams; usable_streams()\n"
+    code = "from airlight.reports.machine.process_start import usable_streams; usable_streams()\n"
     code += f"file = open({str(tmp_path / 'a')!r}, 'w'); print('printed'); import os; os.write(1, b'said')"
     assert run(f'cd {ROOT}; {sys.executable} -c "{code}" >&-').returncode == 0
     assert (tmp_path / "a").read_bytes() == b""
 
 
 def test_json_loses_nothing_in_ascii():
-    code = "from reports.machine.process_start import usable_streams; usable_streams()\n"
+    code = "from airlight.reports.machine.process_start import usable_streams; usable_streams()\n"
     code += "print('\\u2500')\n"
-    code += "from reports.tables.record import print_json; print_json({'name': '\\u2500 \\udcff'})"
+    code += "from airlight.reports.tables.record import print_json; print_json({'name': '\\u2500 \\udcff'})"
     ran = run(f'cd {ROOT}; {sys.executable} -c "{code}"', PYTHONIOENCODING="ascii")
     shown, _, printed = ran.stdout.partition(b"\n")
     assert shown == b"?"

@@ -6,12 +6,12 @@ import json
 import numpy as np
 import pytest
 
-from reports.data.records import Method
-from reports.page.chart import speed_error_chart
-from reports.page.filters import DASH
-from reports.page.render import SCRIPTS, render_page
-from reports.plotting.figure import speed_panel
-from reports.tables.methods import fastest_table
+from airlight.reports.data.records import Method
+from airlight.reports.page.chart import speed_error_chart
+from airlight.reports.page.filters import DASH
+from airlight.reports.page.render import SCRIPTS, render_page
+from airlight.reports.plotting.figure import speed_panel
+from airlight.reports.tables.methods import fastest_table
 from tests.helpers.page import DATA, Page, engine_image, report_data, write_files
 from tests.helpers.reports import checked, entry, growth_record, record_of, refused
 
@@ -46,8 +46,8 @@ def data():
 @pytest.fixture(autouse=True)
 def _no_chart(monkeypatch):
     """Draw no charts for the pages: they take longer than everything else, and have a test of their own."""
-    monkeypatch.setattr("reports.page.render.speed_error_chart", lambda scenes: "<svg></svg>")
-    monkeypatch.setattr("reports.page.render.scene_chart", lambda scenes, place: "<svg></svg>")
+    monkeypatch.setattr("airlight.reports.page.render.speed_error_chart", lambda scenes: "<svg></svg>")
+    monkeypatch.setattr("airlight.reports.page.render.scene_chart", lambda scenes, place: "<svg></svg>")
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, write_exr
-from reports.page.images import (
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.reports.page.images import (
     DIFFERENCE_BITS,
     INFINITE,
     NAN,

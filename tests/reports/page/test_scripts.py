@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.storage.exr import read_exr
-from reports.page.images import page_images
-from reports.page.render import SCRIPTS
-from reports.plotting.pictures import error_map, signed_colours, tone_mapped
+from airlight.reference.storage.exr import read_exr
+from airlight.reports.page.images import page_images
+from airlight.reports.page.render import SCRIPTS
+from airlight.reports.plotting.pictures import error_map, signed_colours, tone_mapped
 from tests.helpers.page import HEIGHT, WIDTH, small_report, write_files
 
 racer = pytest.importorskip("py_mini_racer", reason="the extra `test` has it")

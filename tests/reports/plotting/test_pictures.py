@@ -6,9 +6,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from realtime.methods.registry import METHODS
-from reports.plotting.pictures import error_map, preview, tone_curve, tone_mapped
-from reports.plotting.style import COLOURS, LEAST_DIFFERENCE, kernel_styles, report_styles
+from airlight.realtime.methods.registry import METHODS
+from airlight.reports.plotting.pictures import error_map, preview, tone_curve, tone_mapped
+from airlight.reports.plotting.style import COLOURS, LEAST_DIFFERENCE, kernel_styles, report_styles
 
 MAGENTA = (255, 0, 255)
 

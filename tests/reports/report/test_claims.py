@@ -5,8 +5,9 @@ import copy
 
 import pytest
 
-from reports.data.records import Claim
-from reports.report import claims as made
+from airlight.reports.data.records import Claim
+from airlight.reports.report import claims as made
+from airlight.validation.timing import Scaling
 from tests.helpers.reports import (
     RUN,
     agreement,
@@ -21,7 +22,6 @@ from tests.helpers.reports import (
     scene,
 )
 from tests.helpers.reports import refused as refused_entry
-from validation.timing import Scaling
 
 
 def method(label, rmse, median, *, refused=None):

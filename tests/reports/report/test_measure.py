@@ -12,22 +12,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, read_exr, write_exr
-from reports.data.records import named_files, read_report, report_text
-from reports.machine.own_process import EndedError
-from reports.report.measure import staged, write_report
-from reports.report.others import other_parts
-from reports.report.scene import file_stems, folder_of, reference_record
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, read_exr, write_exr
+from airlight.reports.data.records import named_files, read_report, report_text
+from airlight.reports.machine.own_process import EndedError
+from airlight.reports.report.measure import staged, write_report
+from airlight.reports.report.others import other_parts
+from airlight.reports.report.scene import file_stems, folder_of, reference_record
+from airlight.validation.kernels.records import Stability
+from airlight.validation.scenes.loading import scene_stem
+from airlight.validation.study.configuration import Configuration, configuration
+from airlight.validation.study.run import PROBE
+from airlight.validation.study.study import STUDIES, Checks, Measure, Study, standard_study
+from airlight.validation.timing import Scaling
 from tests.helpers.page import small_report, write_report_files
 from tests.helpers.reports import growth_record, record_of, stable
 from tests.helpers.scenes import LAMP, scene_xml
-from validation.kernels.records import Stability
-from validation.scenes.loading import scene_stem
-from validation.study.configuration import Configuration, configuration
-from validation.study.run import PROBE
-from validation.study.study import STUDIES, Checks, Measure, Study, standard_study
-from validation.timing import Scaling
 
 FLOOR = '<shape type="rectangle"><transform name="to_world"><scale value="6.3"/></transform></shape>'
 FOG = '<float name="sigma_t" value="0.31"/><rgb name="albedo" value="0.9, 0.8, 0.7"/>'
@@ -111,7 +111,7 @@ def test_the_data_are_read_again_and_every_file_that_they_name_is_there(written)
 
 
 def test_images_can_be_read_and_give_the_errors_of_the_table(written):
-    from validation.metrics.errors import error_metrics
+    from airlight.validation.metrics.errors import error_metrics
 
     (scene,) = written.data["scenes"]
     reference = read_exr(written.folder / scene["files"]["exr"])
@@ -174,8 +174,8 @@ def test_a_new_method_takes_its_errors_alone_and_times_of_all_in_one_run(written
 
 @pytest.mark.claim("report-kept")
 def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_path, monkeypatch):
-    from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-    from reference.quadrature.image import quadrature_image
+    from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+    from airlight.reference.quadrature.image import quadrature_image
 
     calls = []
 
@@ -189,10 +189,12 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
 
     # Half the time: what `fresh` tells one estimator it tells both.
     checks = replace(TINY.checks, margins={"single-scatter": 0.2}, samples={"single-scatter": 4})
-    monkeypatch.setattr("validation.estimates.quadrature.quadrature_image", counted(quadrature_image))
-    monkeypatch.setattr("validation.estimates.monte_carlo.single_scatter_batch", counted(single_scatter_batch))
+    monkeypatch.setattr("airlight.validation.estimates.quadrature.quadrature_image", counted(quadrature_image))
+    monkeypatch.setattr("airlight.validation.estimates.monte_carlo.single_scatter_batch", counted(single_scatter_batch))
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
+    monkeypatch.setattr(
+        "airlight.validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple
+    )
     repeated = again(written, tmp_path, fresh=True, configurations=(MARCH,), checks=checks)
     assert (repeated["cached"], repeated["computed"]) == (0, 3 + 1 + 1)
     assert set(calls) == {quadrature_image, single_scatter_batch}
@@ -209,8 +211,10 @@ def test_fresh_computes_references_and_batches_again_too(written, variant, tmp_p
 def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypatch, own_cache):
     """In a cache of its own: what it finds again replaces what was kept."""
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("validation.study.scene.agreements", lambda scene, margins, **options: {})
-    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
+    monkeypatch.setattr("airlight.validation.study.scene.agreements", lambda scene, margins, **options: {})
+    monkeypatch.setattr(
+        "airlight.validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple
+    )
     path = tmp_path / "mine.xml"
     counts = []
     for sigma_t in ("0.31", "0.37"):
@@ -223,7 +227,7 @@ def test_a_changed_scene_is_measured_again(written, variant, tmp_path, monkeypat
 
 @pytest.mark.claim("report-kept")
 def test_an_engines_image_is_judged_at_its_size_by_the_reference_that_is_kept(written, variant, tmp_path):
-    from validation.engine.images import EngineImage
+    from airlight.validation.engine.images import EngineImage
 
     path, (scene,) = tmp_path / "my <fog>.exr", written.data["scenes"]
     image = read_exr(written.folder / scene["files"]["exr"])
@@ -277,7 +281,7 @@ def test_a_method_that_ends_its_process_is_told_at_once_and_is_a_row_with_the_re
         calls.append(cell.size)
         raise EndedError(f"method {name}: ended its process, killed by SIGABRT")
 
-    monkeypatch.setattr("reports.report.measure.in_own_process", ends)
+    monkeypatch.setattr("airlight.reports.report.measure.in_own_process", ends)
     study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),))
     (ended,) = write_report(tmp_path / "again", study, apart=True).scenes[0].methods
     assert (ended.status, ended.times) == ("refused", None)
@@ -290,7 +294,7 @@ def test_a_refusal_by_a_users_method_is_no_fault(written, variant, tmp_path, mon
     def refuses(function, cell, *, name):
         raise InputError("the medium has bounds")
 
-    monkeypatch.setattr("reports.report.measure.in_own_process", refuses)
+    monkeypatch.setattr("airlight.reports.report.measure.in_own_process", refuses)
     study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=(configuration(at_fault),))
     (row,) = write_report(tmp_path / "again", study, apart=True).scenes[0].methods
     assert (row.status, row.reason) == ("refused", "the medium has bounds")
@@ -298,7 +302,7 @@ def test_a_refusal_by_a_users_method_is_no_fault(written, variant, tmp_path, mon
 
 
 def test_the_device_of_shaders_is_part_of_the_machine(variant, tmp_path, monkeypatch):
-    monkeypatch.setattr("reports.report.measure.require_opengl", lambda: "llvmpipe 25.0")
+    monkeypatch.setattr("airlight.reports.report.measure.require_opengl", lambda: "llvmpipe 25.0")
     for method, device in (("fog.glsl", "llvmpipe 25.0"), ("ray-march", None)):
         report = write_report(tmp_path, replace(TINY, configurations=(Configuration(method),)))
         assert report.environment.opengl == device
@@ -309,7 +313,7 @@ def test_the_device_of_shaders_is_part_of_the_machine(variant, tmp_path, monkeyp
 
 def test_stability_and_growth_have_their_records_their_time_and_are_kept(written, variant, tmp_path, monkeypatch):
     """Stubs measure: `tests/validation` has what they measure."""
-    from reports.report import others
+    from airlight.reports.report import others
 
     measured = []
 
@@ -321,9 +325,9 @@ def test_stability_and_growth_have_their_records_their_time_and_are_kept(written
         measured.append((work, study.measure.seconds))
         return [record_of(growth_record(cliff=True), Scaling)]
 
-    monkeypatch.setattr("validation.kernels.stability.stability", stability)
-    monkeypatch.setattr("validation.study.growth.study_growth", growth)
-    monkeypatch.setattr("validation.study.growth.ladder", lambda *given: [])
+    monkeypatch.setattr("airlight.validation.kernels.stability.stability", stability)
+    monkeypatch.setattr("airlight.validation.study.growth.study_growth", growth)
+    monkeypatch.setattr("airlight.validation.study.growth.ladder", lambda *given: [])
     monkeypatch.setattr(others, "in_own_process", lambda function, *given, **how: function(*given))
     small = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=())
     monkeypatch.setattr(others, "standard_study", lambda name: small)
@@ -347,7 +351,7 @@ def test_workers_compute_the_references_and_are_asked_for_the_batches_that_check
 ):
     """A stub of the workers: `tests/reports/cluster` has processes."""
     pytest.importorskip("distributed", reason="the extra `sweep` is not installed")
-    from reports.cluster.run import _outcome
+    from airlight.reports.cluster.run import _outcome
 
     sent, spreads = [], []
 
@@ -360,12 +364,14 @@ def test_workers_compute_the_references_and_are_asked_for_the_batches_that_check
         spreads.append(spread("volpath", 4, None))
         return {}
 
-    monkeypatch.setattr("reports.cluster.references.facts", lambda: None)
+    monkeypatch.setattr("airlight.reports.cluster.references.facts", lambda: None)
     cluster = SimpleNamespace(scheduler_info=lambda **how: {"workers": {"one": {}, "two": {}}})
-    monkeypatch.setattr("reports.cluster.references.run_groups", run_groups)
-    monkeypatch.setattr("validation.study.scene.agreements", agreements)
+    monkeypatch.setattr("airlight.reports.cluster.references.run_groups", run_groups)
+    monkeypatch.setattr("airlight.validation.study.scene.agreements", agreements)
     multiple = written.data["scenes"][0]["multiple"]
-    monkeypatch.setattr("validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple)
+    monkeypatch.setattr(
+        "airlight.validation.study.scene.multiple_scattering_fraction", lambda scene, **options: multiple
+    )
     study = replace(TINY, scenes=(written.data["scenes"][0]["path"],), configurations=())
     data = as_json(write_report(tmp_path / "again", study, cluster=cluster))
     assert sent == ["reference 0"]
@@ -401,7 +407,7 @@ def test_labels_that_would_share_a_file_get_numbers():
 
 @pytest.mark.slow
 def test_a_report_times_growing_work(variant, tmp_path, monkeypatch):
-    from reports.report import others
+    from airlight.reports.report import others
 
     small = replace(others.standard_study("scaling").at((16, 12)), scenes=("open-fog",))
     monkeypatch.setattr(others, "standard_study", lambda name: small)
@@ -490,7 +496,7 @@ def test_the_remains_of_a_killed_run_go_after_a_day(tmp_path):
 
 @pytest.mark.parametrize("airlight", [np.zeros((2, 3, 3)), np.full((2, 3, 3), np.inf)])
 def test_reference_without_light_that_is_finite_has_no_numbers_rather_than_nan(airlight):
-    from reference.quadrature.ray_values import ReferenceImage
+    from airlight.reference.quadrature.ray_values import ReferenceImage
 
     black = np.zeros_like(airlight)
     found = reference_record(ReferenceImage(airlight, black, black, np.ones((2, 3)), np.ones((2, 3)), 0, float("nan")))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import airlight
-from reports.commands import main as cli
+from airlight.reports.commands import main as cli
+from airlight.validation.kernels.case_files import read_cases
 from tests.helpers.api import third
-from validation.kernels.case_files import read_cases
 
 # Integrals
 
@@ -51,7 +51,7 @@ def test_integrals_have_the_shape_of_the_columns_and_a_certified_value(variant, 
 
 @pytest.mark.claim("droplets-by-name")
 def test_integrals_of_a_file_take_a_phase_function_by_words(variant, capfd, tmp_path):
-    from validation.kernels.case_files import integrate_cases
+    from airlight.validation.kernels.case_files import integrate_cases
 
     rays, written = tmp_path / "rays.csv", tmp_path / "results.csv"
     rays.write_text("phase,t,h,x0,x1,sigma_t\nhg-draine:12,1,0.5,0,3,0.2\nhg-draine:12,-1,0.25,0.5,inf,0.1\n")
@@ -75,7 +75,7 @@ def test_kernels_are_named_by_an_option(variant, tmp_path, monkeypatch):
         asked.append(names)
         return []
 
-    monkeypatch.setattr("validation.kernels.benchmark.bench_kernels", bench_kernels)
+    monkeypatch.setattr("airlight.validation.kernels.benchmark.bench_kernels", bench_kernels)
     written = tmp_path / "kernels.json"
     assert cli.run(["study", "kernels", "--kernel", "exact", "--kernel", "taylor-8", "-o", str(written)]) == 0
     assert json.loads(written.read_text())["kernels"] == {"costs": [], "levels": []}
@@ -85,9 +85,9 @@ def test_kernels_are_named_by_an_option(variant, tmp_path, monkeypatch):
 
 @pytest.mark.claim("exact-keeps-its-bar")
 def test_stability_fails_where_the_claim_is_broken(variant, monkeypatch, capsys):
-    from realtime.kernels.registry import KERNELS
+    from airlight.realtime.kernels.registry import KERNELS
 
-    monkeypatch.setattr("reports.studies.kernels._TRIED_RAYS", 64)
+    monkeypatch.setattr("airlight.reports.studies.kernels._TRIED_RAYS", 64)
     assert airlight.study("stability", kernel="taylor").passed
     monkeypatch.setitem(KERNELS, "exact", replace(KERNELS["taylor"], name="exact", exact=True))
     assert cli.run(["study", "stability", "--kernel", "exact"]) == 1
@@ -125,7 +125,7 @@ QUICK = {
 @pytest.mark.parametrize("name", QUICK)
 def test_a_figure_is_drawn_twice_to_the_same_bytes(name, variant, tmp_path, monkeypatch):
     """TrueType fonts are embedded, and no date."""
-    monkeypatch.setattr("validation.kernels.benchmark.RAYS", 3000)
+    monkeypatch.setattr("airlight.validation.kernels.benchmark.RAYS", 3000)
     found = airlight.study(name, **QUICK[name])
     first = found.save(tmp_path / "first.pdf", "single").read_bytes()
     assert found.save(tmp_path / "again.pdf", "single").read_bytes() == first

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import airlight
-from realtime.kernels.exact import exact
-from realtime.methods.unshadowed import unshadowed
-from reference.storage.files import temporary_folder
-from reports.commands import main as cli
+from airlight.realtime.kernels.exact import exact
+from airlight.realtime.methods.unshadowed import unshadowed
+from airlight.reference.storage.files import temporary_folder
+from airlight.reports.commands import main as cli
+from airlight.validation.columns import record_of
+from airlight.validation.timing import Scaling
 from tests.helpers.api import TINY, brighter
 from tests.helpers.reports import growth_record
-from validation.columns import record_of
-from validation.timing import Scaling
 
 
 def printed(capfd, *arguments, status=0):
@@ -80,7 +80,8 @@ def test_scaling_that_jumps_ends_with_1_and_is_drawn(variant, capfd, monkeypatch
     for jump, status in ((False, 0), (True, 1)):
         found = growth_record(cliff=jump) | {"scene": "sphere-spot", "run": None}
         monkeypatch.setattr(
-            "validation.study.growth.study_growth", lambda *given, found=found, **options: [record_of(found, Scaling)]
+            "airlight.validation.study.growth.study_growth",
+            lambda *given, found=found, **options: [record_of(found, Scaling)],
         )
         assert printed(capfd, *arguments, status=status)["scaling"] == [found]
         assert (tmp_path / "growth.png").stat().st_size > 1000

@@ -6,12 +6,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from analytic.errors import InputError
-from reports.sweep.claims import claim, correlations, strongest, sure
-from reports.sweep.faults import checks, faults, reasons
-from reports.sweep.samples import FILE, Fastest, fastest_within, read_sweep, samples
+from airlight.analytic.errors import InputError
+from airlight.reports.sweep.claims import claim, correlations, strongest, sure
+from airlight.reports.sweep.faults import checks, faults, reasons
+from airlight.reports.sweep.samples import FILE, Fastest, fastest_within, read_sweep, samples
+from airlight.validation.statistics.samples import binomial_interval
 from tests.helpers.sweeps import row, rows, write_rows
-from validation.statistics.samples import binomial_interval
 
 
 @pytest.fixture

@@ -7,14 +7,14 @@ from itertools import islice
 
 import pytest
 
-from reports.commands.main import run
-from reports.page.chart import svg_text
-from reports.sweep.page import drawn_figures, render_sweep, write_sweep
-from reports.sweep.samples import FILE, read_sweep
-from reports.sweep.summary import summary_of
+from airlight.reports.commands.main import run
+from airlight.reports.page.chart import svg_text
+from airlight.reports.sweep.page import drawn_figures, render_sweep, write_sweep
+from airlight.reports.sweep.samples import FILE, read_sweep
+from airlight.reports.sweep.summary import summary_of
+from airlight.validation.columns import plain
 from tests.helpers.page import Page
 from tests.helpers.sweeps import METHODS, faulty_rows, row, rows, write_rows
-from validation.columns import plain
 
 
 def said_of(folder, several):
@@ -45,7 +45,7 @@ def test_page_needs_nothing_but_itself(page):
 
 @pytest.mark.claim("sweep-page-stands-alone")
 def test_page_keeps_the_pictures_of_the_worst(said, charts, monkeypatch):
-    monkeypatch.setattr("reports.sweep.page.PICTURES", len(said.worst))
+    monkeypatch.setattr("airlight.reports.sweep.page.PICTURES", len(said.worst))
     shown = Page(render_sweep(said, charts))
     assert re.search(r"\d+ pictures are left out to keep the page small", shown.text)
     # The worst scene of every configuration keeps its picture.
@@ -100,7 +100,7 @@ def test_all_is_written_from_the_parquet(tmp_path):
 
 
 def test_the_command_writes_beside_the_rows_and_prints_what_it_writes(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("reports.sweep.page.drawn_figures", lambda said: iter(()))  # they take long
+    monkeypatch.setattr("airlight.reports.sweep.page.drawn_figures", lambda said: iter(()))  # they take long
     write_rows(tmp_path / FILE, rows(30))
     assert run(["sweep", "--from", str(tmp_path)]) == 0
     assert METHODS[0][0] in capsys.readouterr().out

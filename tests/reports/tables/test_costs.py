@@ -4,11 +4,18 @@
 import csv as comma_separated
 import io
 
-from reports.tables.costs import cliffs, cost_table, kernel_tables, same_records, scaling_tables, stability_summary
-from reports.tables.drawing import csv, markdown, text
+from airlight.reports.tables.costs import (
+    cliffs,
+    cost_table,
+    kernel_tables,
+    same_records,
+    scaling_tables,
+    stability_summary,
+)
+from airlight.reports.tables.drawing import csv, markdown, text
+from airlight.validation.kernels.records import ErrorLevel, KernelCost, KernelErrors, Rays, RayTime, Stability
+from airlight.validation.timing import Scaling
 from tests.helpers.reports import growth_record, record_of
-from validation.kernels.records import ErrorLevel, KernelCost, KernelErrors, Rays, RayTime, Stability
-from validation.timing import Scaling
 
 
 def cells(table):

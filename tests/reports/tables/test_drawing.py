@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from reports.tables.drawing import csv, html, latex, markdown, text
-from reports.tables.table import Column, Measured, Name, Row, Table, numbers, table, with_spread, words
+from airlight.reports.tables.drawing import csv, html, latex, markdown, text
+from airlight.reports.tables.table import Column, Measured, Name, Row, Table, numbers, table, with_spread, words
 
 
 @pytest.mark.claim("latex-tables")

@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import pytest
 
-from reports.data.records import Method, Scene
-from reports.tables.agreement import trust_table, verdict
-from reports.tables.costs import cliffs, scaling_tables
-from reports.tables.drawing import csv, html, latex, markdown, text
-from reports.tables.methods import COLUMNS, TIMES, fastest_table, method_row, methods_table, times_words
-from reports.tables.table import Verdict
+from airlight.reports.data.records import Method, Scene
+from airlight.reports.tables.agreement import trust_table, verdict
+from airlight.reports.tables.costs import cliffs, scaling_tables
+from airlight.reports.tables.drawing import csv, html, latex, markdown, text
+from airlight.reports.tables.methods import COLUMNS, TIMES, fastest_table, method_row, methods_table, times_words
+from airlight.reports.tables.table import Verdict
+from airlight.validation.statistics.records import Agreement
+from airlight.validation.timing import Scaling
 from tests.helpers.reports import RUN, agreement, errors, growth_record, record_of, scene
 from tests.helpers.reports import entry as made
-from validation.statistics.records import Agreement
-from validation.timing import Scaling
 
 MEDIANS = {name: 2.0 + place for place, name in enumerate(TIMES)}  # no two alike
 

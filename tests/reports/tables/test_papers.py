@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claims of papers: a table of verdicts for each paper, its numbers without a verdict apart, and their counts."""
 
-from reports.tables.papers import count_words, paper_tables
-from reports.tables.table import Interval
-from validation.papers.claims import Claim
+from airlight.reports.tables.papers import count_words, paper_tables
+from airlight.reports.tables.table import Interval
+from airlight.validation.papers.claims import Claim
 
 
 def claim(item, verdict=None, paper="biri", **changes):

@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
-from analytic.errors import InputError
-from reports.tables.record import Said, picture, print_json
-from reports.tables.table import numbers, table
+from airlight.analytic.errors import InputError
+from airlight.reports.tables.record import Said, picture, print_json
+from airlight.reports.tables.table import numbers, table
 
 
 def test_a_result_has_its_claims_tables_and_lines_wherever_it_is_shown():

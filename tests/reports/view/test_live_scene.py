@@ -6,15 +6,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import read_scene
-from reports.plotting.pictures import NOT_FINITE, tone_mapped
-from reports.view.live_scene import LiveScene
-from reports.view.picture import LAYERS, Pictures
-from reports.view.reference import KnownReference, view_error
-from validation.metrics.errors import error_metrics
-from validation.scenes.loading import load_scene
-from validation.study.configuration import configuration, prepared
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reports.plotting.pictures import NOT_FINITE, tone_mapped
+from airlight.reports.view.live_scene import LiveScene
+from airlight.reports.view.picture import LAYERS, Pictures
+from airlight.reports.view.reference import KnownReference, view_error
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import configuration, prepared
 
 pytestmark = pytest.mark.usefixtures("variant")
 

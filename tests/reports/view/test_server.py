@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import pytest
 
-from reports.view.server import Server
+from airlight.reports.view.server import Server
 
 websockets = pytest.importorskip("websockets.sync.client", reason="the extra `view` has it")
 

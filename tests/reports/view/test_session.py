@@ -12,13 +12,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.storage.exr import read_exr
-from reports.commands import main as cli
-from reports.view.reference import KnownReference, Task, answers
-from reports.view.session import Session
-from reports.view.widgets import ViewState
+from airlight.reference.storage.exr import read_exr
+from airlight.reports.commands import main as cli
+from airlight.reports.view.reference import KnownReference, Task, answers
+from airlight.reports.view.session import Session
+from airlight.reports.view.widgets import ViewState
+from airlight.validation.study.configuration import configuration
 from tests.helpers.shaders import need_opengl
-from validation.study.configuration import configuration
 
 SIZE = (20, 15)
 AIM = {"camera.origin": [0.61, -0.3, 0.4], "camera.target": [0.2, 0.1, 4.0], "camera.up": [0, 1, 0]}
@@ -86,7 +86,7 @@ def opened(scene="sphere-spot", method="shadow-planes", **parameters):
 
 @pytest.fixture
 def view(variant, monkeypatch):
-    monkeypatch.setattr("reports.view.session.ReferenceInBackground", ReferenceAtOnce)
+    monkeypatch.setattr("airlight.reports.view.session.ReferenceInBackground", ReferenceAtOnce)
     return opened
 
 
@@ -114,7 +114,7 @@ def test_the_commands_on_the_page_show_what_is_shown(view, tmp_path, monkeypatch
     np.testing.assert_array_equal(written["surface"], frame.surface.astype(np.float32))
     assert np.abs(page.frames[0]["picture"].astype(int) - page.frames[-1]["picture"]).max() > 0
     started = []
-    monkeypatch.setattr("reports.view.session.Session", lambda state, variant: started.append(state) or 1 / 0)
+    monkeypatch.setattr("airlight.reports.view.session.Session", lambda state, variant: started.append(state) or 1 / 0)
     with pytest.raises(ZeroDivisionError):
         cli.run(commands["view"])
     assert started == [session._state()]
@@ -168,14 +168,14 @@ def test_the_mean_of_noisy_frames_comes_nearer_to_the_reference_until_something_
 @pytest.mark.parametrize("method", ["ray-march", "ray-march+history"])
 def test_frames_of_a_scene_that_changes_are_judged_as_they_were_shown(view, monkeypatch, method):
     """A history has the light of earlier frames: while a light moves it is further off than the same method at rest."""
-    monkeypatch.setattr("reports.view.session._STILL", 1e9)
+    monkeypatch.setattr("airlight.reports.view.session._STILL", 1e9)
     session, page = view("open-fog", method, steps=64)
     for n in range(6):
         ask(session, page, kind="change", changes={"light.position": [0.83 - 0.3 * n, 0.47, 1.57]})
     moving = page.last("motion")
     assert moving["frames"] >= 5
     assert moving["pixels"] == 256
-    monkeypatch.setattr("reports.view.session._STILL", 0.0)
+    monkeypatch.setattr("airlight.reports.view.session._STILL", 0.0)
     turns(
         session,
         lambda: (

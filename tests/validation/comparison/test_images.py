@@ -6,13 +6,13 @@ import json
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, read_exr, write_exr
-from validation.columns import plain
-from validation.comparison.images import compare_images, read_mask
-from validation.metrics.colour import colour_difference
-from validation.metrics.errors import error_metrics
-from validation.metrics.other_tools import published_errors
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, read_exr, write_exr
+from airlight.validation.columns import plain
+from airlight.validation.comparison.images import compare_images, read_mask
+from airlight.validation.metrics.colour import colour_difference
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.metrics.other_tools import published_errors
 
 SHAPE = (9, 12, 3)
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from validation.engine.curves import (
+from airlight.validation.engine.curves import (
     PRIMARIES,
     TONE_CURVES,
     agx,
@@ -18,7 +18,7 @@ from validation.engine.curves import (
     to_pq,
     to_srgb,
 )
-from validation.fog_model.view import EDGES
+from airlight.validation.fog_model.view import EDGES
 
 
 def test_pq_has_the_values_of_its_standard():

@@ -11,23 +11,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
-from reference.storage.exr import NOTE, Image
+from airlight.analytic.errors import InputError
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.exr import NOTE, Image
+from airlight.validation.engine.curves import to_srgb
+from airlight.validation.engine.diagnose import diagnose_image
+from airlight.validation.engine.evidence import Blocks
+from airlight.validation.engine.fault import Fault
+from airlight.validation.engine.light_faults import PLACE
+from airlight.validation.engine.prediction import Guess, SceneLight
+from airlight.validation.engine.search import Explanation, _Search
+from airlight.validation.engine.seen import judged_layer, seen_image
+from airlight.validation.fog_model.radiance import FogModel, scene_fog
+from airlight.validation.fog_model.view import Scenery, scattering_paths, view_of
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.injected_faults import INJECTED
 from tests.helpers.scenes import FOG, scene_xml
-from validation.engine.curves import to_srgb
-from validation.engine.diagnose import diagnose_image
-from validation.engine.evidence import Blocks
-from validation.engine.fault import Fault
-from validation.engine.light_faults import PLACE
-from validation.engine.prediction import Guess, SceneLight
-from validation.engine.search import Explanation, _Search
-from validation.engine.seen import judged_layer, seen_image
-from validation.fog_model.radiance import FogModel, scene_fog
-from validation.fog_model.view import Scenery, scattering_paths, view_of
-from validation.scenes.loading import load_scene
 
 SIZE = (32, 24)
 
@@ -77,7 +77,7 @@ def test_an_injected_fault_comes_first_in_noise_and_pixels_of_a_kind_that_nobody
 @pytest.mark.slow
 def test_a_light_that_is_off_is_named_among_many_triangles(reference, monkeypatch):
     """There less is tried, since paths cost much."""
-    monkeypatch.setattr("validation.engine.prediction._MANY_TRIANGLES", 0)
+    monkeypatch.setattr("airlight.validation.engine.prediction._MANY_TRIANGLES", 0)
     (injected,) = (each for each in INJECTED if each.name == "light-position")
     diagnosis = diagnosed(injected.image(reference))
     assert diagnosis.first == "light-position"

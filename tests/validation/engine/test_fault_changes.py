@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from analytic.height_fog import HeightFog, Layer
-from validation.engine import prediction
-from validation.engine.fault import Fault, factor_name
-from validation.engine.faults import FAULTS
-from validation.engine.layer_faults import scaled
-from validation.engine.light_faults import position_held
-from validation.engine.prediction import Guess, SceneLight
-from validation.fog_model.radiance import Fog
+from airlight.analytic.height_fog import HeightFog, Layer
+from airlight.validation.engine import prediction
+from airlight.validation.engine.fault import Fault, factor_name
+from airlight.validation.engine.faults import FAULTS
+from airlight.validation.engine.layer_faults import scaled
+from airlight.validation.engine.light_faults import position_held
+from airlight.validation.engine.prediction import Guess, SceneLight
+from airlight.validation.fog_model.radiance import Fog
 
 FOG = Fog(
     sigma_t=((0.5, 0.5, 0.4), (0.0, 0.0, 0.0)),

@@ -8,16 +8,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.height_fog import HeightFog
-from reference.scene.read import read_reference
+from airlight.analytic.height_fog import HeightFog
+from airlight.reference.scene.read import read_reference
+from airlight.validation.engine import faults
+from airlight.validation.engine.diagnose import _PARTS, _Attempt, _differ, _in_order
+from airlight.validation.engine.fault import Fault, Number, traits
+from airlight.validation.engine.faults import FAULTS, faults_of
+from airlight.validation.engine.prediction import Predictor
+from airlight.validation.engine.seen import APART
+from airlight.validation.fog_model.radiance import Fog
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
-from validation.engine import faults
-from validation.engine.diagnose import _PARTS, _Attempt, _differ, _in_order
-from validation.engine.fault import Fault, Number, traits
-from validation.engine.faults import FAULTS, faults_of
-from validation.engine.prediction import Predictor
-from validation.engine.seen import APART
-from validation.fog_model.radiance import Fog
 
 
 def test_faults_of_lights_have_their_names_and_numbers(variant, monkeypatch):

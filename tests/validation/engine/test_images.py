@@ -7,12 +7,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, write_exr
-from validation.engine.hints import find_hints
-from validation.engine.images import TIMES, EngineImage, find_images, image_times, images_size, measure_image, notes_of
-from validation.scenes.loading import load_scene
-from validation.timing import Timing
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.validation.engine.hints import find_hints
+from airlight.validation.engine.images import (
+    TIMES,
+    EngineImage,
+    find_images,
+    image_times,
+    images_size,
+    measure_image,
+    notes_of,
+)
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.timing import Timing
 
 SCENES = {"open-fog": "open-fog", "hall": "hall", "hall.small": "hall.small", "mine": "folder/mine.xml"}
 SHAPE = (4, 6, 3)

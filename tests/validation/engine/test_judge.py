@@ -6,17 +6,17 @@ import re
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, read_exr, write_exr
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, read_exr, write_exr
+from airlight.validation.comparison.images import compare_images
+from airlight.validation.engine.error_place import error_place
+from airlight.validation.engine.hints import find_hints
+from airlight.validation.engine.images import EngineImage, measure_image
+from airlight.validation.engine.judge import Verdict, compare_scene, judge, references
+from airlight.validation.engine.seen import expected_layer, judged_layer, seen_image
+from airlight.validation.estimates.quadrature import reference_error, reference_image, reference_layer, relative_error
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.scenes import scene_xml
-from validation.comparison.images import compare_images
-from validation.engine.error_place import error_place
-from validation.engine.hints import find_hints
-from validation.engine.images import EngineImage, measure_image
-from validation.engine.judge import Verdict, compare_scene, judge, references
-from validation.engine.seen import expected_layer, judged_layer, seen_image
-from validation.estimates.quadrature import reference_error, reference_image, reference_layer, relative_error
-from validation.scenes.loading import load_scene
 
 
 def refused(text):

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from validation.engine import seen
-from validation.engine.seen import PixelKind, decide_pixel, needed_samples, relative_errors, stopped
+from airlight.validation.engine import seen
+from airlight.validation.engine.seen import PixelKind, decide_pixel, needed_samples, relative_errors, stopped
 
 
 @pytest.fixture

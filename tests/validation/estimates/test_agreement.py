@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import mitsuba as mi
 import pytest
 
-from reference.scene.read import read_reference
+from airlight.reference.scene.read import read_reference
+from airlight.validation.estimates import agreement as agreement_module
+from airlight.validation.estimates.agreement import MASK_PIXELS, agreement, layer_masks, pixel_angle
+from airlight.validation.estimates.monte_carlo import monte_carlo_batches
+from airlight.validation.estimates.quadrature import reference_image
 from tests.helpers.scenes import tiny_scene
-from validation.estimates import agreement as agreement_module
-from validation.estimates.agreement import MASK_PIXELS, agreement, layer_masks, pixel_angle
-from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.quadrature import reference_image
 
 pytestmark = pytest.mark.statistical
 
@@ -24,11 +24,13 @@ def scene(variant):
 
 def false_reference(monkeypatch, change):
     """Let the comparison take a changed image for the reference."""
-    import validation.estimates.agreement
+    import airlight.validation.estimates.agreement
 
-    true = validation.estimates.agreement.reference_image
+    true = airlight.validation.estimates.agreement.reference_image
     monkeypatch.setattr(
-        validation.estimates.agreement, "reference_image", lambda *args, **kwargs: change(true(*args, **kwargs))
+        airlight.validation.estimates.agreement,
+        "reference_image",
+        lambda *args, **kwargs: change(true(*args, **kwargs)),
     )
 
 

@@ -10,18 +10,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import validation.estimates.images
-import validation.estimates.monte_carlo
-from analytic.errors import InputError
-from reference.monte_carlo.batches import Batches, single_batch
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_reference
-from reference.storage.cache import cache_folder
-from reference.storage.exr import Image
-from reference.storage.store import fresh_results
-from tests.helpers.scenes import tiny_scene
-from validation.estimates.agreement import MASK_PIXELS, pixel_angle
-from validation.estimates.images import (
+import airlight.validation.estimates.images
+import airlight.validation.estimates.monte_carlo
+from airlight.analytic.errors import InputError
+from airlight.reference.monte_carlo.batches import Batches, single_batch
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.cache import cache_folder
+from airlight.reference.storage.exr import Image
+from airlight.reference.storage.store import fresh_results
+from airlight.validation.estimates.agreement import MASK_PIXELS, pixel_angle
+from airlight.validation.estimates.images import (
     Budget,
     batch_plan,
     cloud_orders,
@@ -29,10 +28,11 @@ from validation.estimates.images import (
     near_light,
     relative_errors,
 )
-from validation.estimates.merge import merged_references
-from validation.estimates.monte_carlo import BLOCK, monte_carlo_batches
-from validation.estimates.quadrature import reference_image
-from validation.scenes.loading import LoadedScene, load_scene
+from airlight.validation.estimates.merge import merged_references
+from airlight.validation.estimates.monte_carlo import BLOCK, monte_carlo_batches
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import LoadedScene, load_scene
+from tests.helpers.scenes import tiny_scene
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def traced(monkeypatch, own_cache):
         mean = np.random.default_rng([seed, samples, max_depth]).exponential(size=(2, 12, 3))
         return single_batch(seed, samples, mean)
 
-    monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", trace)
+    monkeypatch.setattr(airlight.validation.estimates.monte_carlo, "volpath_batch", trace)
     return seeds
 
 
@@ -83,7 +83,10 @@ def test_the_cache_never_changes_what_is_returned(scene, traced, monkeypatch, tm
 def test_moments_are_those_of_all_batches(scene, traced):
     pooled = volpath(scene, batches=21, first_seed=5).batches
     means = np.stack(
-        [validation.estimates.monte_carlo.volpath_batch(read_reference(scene), seed, 4).mean for seed in range(5, 26)]
+        [
+            airlight.validation.estimates.monte_carlo.volpath_batch(read_reference(scene), seed, 4).mean
+            for seed in range(5, 26)
+        ]
     )
     # Sums of 21 numbers in another order: a few roundings.
     np.testing.assert_allclose(pooled.mean, means.mean(axis=0), rtol=1e-13)
@@ -131,7 +134,7 @@ def test_damage_is_found_counted_and_repaired(scene, traced, damage, name):
 
 @pytest.mark.parametrize("failing", [2, 7])
 def test_a_full_disk_says_what_was_kept(scene, traced, monkeypatch, failing):
-    write = validation.estimates.monte_carlo.store
+    write = airlight.validation.estimates.monte_carlo.store
     stored: list[str] = []
 
     def full(key, arrays, spent):
@@ -140,11 +143,11 @@ def test_a_full_disk_says_what_was_kept(scene, traced, monkeypatch, failing):
         stored.append(key)
         write(key, arrays, spent)
 
-    monkeypatch.setattr(validation.estimates.monte_carlo, "store", full)
+    monkeypatch.setattr(airlight.validation.estimates.monte_carlo, "store", full)
     with pytest.raises(OSError, match=f"{failing} finished batches are kept; make room") as raised:
         volpath(scene, batches=12)
     assert raised.value.filename == str(cache_folder())
-    monkeypatch.setattr(validation.estimates.monte_carlo, "store", write)
+    monkeypatch.setattr(airlight.validation.estimates.monte_carlo, "store", write)
     traced.clear()
     volpath(scene, batches=12)
     assert traced == list(range(failing, 12))
@@ -298,8 +301,8 @@ def test_an_error_of_no_pixel_is_not_zero():
     some = np.array([True, True, False, False])
     beside = lit * some[:, None]  # lit only where pixels are left out
     cases = [(lit, dark, ~np.zeros(4, bool)), (lit, lit, ~np.zeros(4, bool)), (beside, lit, some), (dark, dark, ~some)]
-    for airlight, surface, near in cases:
-        errors = relative_errors(batches([airlight, surface], [0.1 * airlight, 0.1 * surface]), near)
+    for fog, surface, near in cases:
+        errors = relative_errors(batches([fog, surface], [0.1 * fog, 0.1 * surface]), near)
         assert (errors.pooled, errors.worst) == (None, None)
     # A layer that is dark everywhere takes nothing from what is known of the other.
     errors = relative_errors(batches([lit, dark], [0.1 * lit, dark]), some)
@@ -310,7 +313,7 @@ def test_an_error_of_no_pixel_is_not_zero():
 def clock(monkeypatch):
     """A clock of our own; `clock.now` is what it shows [s]."""
     clock = SimpleNamespace(now=50.0, process_time=lambda: 0.0, perf_counter=lambda: clock.now)
-    monkeypatch.setattr("analytic.clock.time", clock)
+    monkeypatch.setattr("airlight.analytic.clock.time", clock)
     return clock
 
 
@@ -318,14 +321,14 @@ def clock(monkeypatch):
 def loaded(variant, monkeypatch, own_cache, clock):
     """A scene whose batches are random numbers of relative deviation 0.4, and take a second each."""
 
-    import validation.estimates.monte_carlo
+    import airlight.validation.estimates.monte_carlo
 
     def trace(reference, seed, samples, **options):
         clock.now += 1.0
         mean = np.random.default_rng(seed).normal(1.0, 0.4, (2, 12, 3))
         return single_batch(seed, samples, mean)
 
-    monkeypatch.setattr(validation.estimates.monte_carlo, "volpath_batch", trace)
+    monkeypatch.setattr(airlight.validation.estimates.monte_carlo, "volpath_batch", trace)
     lamp = {"type": "point", "position": [0.3, -9.0, 1.1]}  # behind the camera: no pixel is left out
     return LoadedScene("tiny", mi.load_dict(tiny_scene(size=(4, 3), lamp=lamp)), "", "")
 
@@ -362,7 +365,9 @@ def test_no_run_stops_on_a_target_before_its_error_is_known(loaded):
 
 @pytest.mark.claim("targets-of-a-run")
 def test_a_run_whose_error_is_not_known_ends_and_reaches_nothing(loaded, monkeypatch):
-    monkeypatch.setattr(validation.estimates.images, "near_light", lambda reference, distance: np.ones(12, dtype=bool))
+    monkeypatch.setattr(
+        airlight.validation.estimates.images, "near_light", lambda reference, distance: np.ones(12, dtype=bool)
+    )
     reference, _ = run(loaded, Budget(error=0.5))
     assert (reference.image.attributes["airlight:batches"], reference.reached) == (32, False)
 

@@ -5,10 +5,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.monte_carlo.volpath import volpath_batch
-from reference.scene.read import read_reference
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.scene.read import read_reference
+from airlight.validation.estimates.multiple_scattering import left_out, multiple_scattering_fraction
 from tests.helpers.scenes import tiny_scene
-from validation.estimates.multiple_scattering import left_out, multiple_scattering_fraction
 
 
 def scene(albedo=0.9, sigma_t=0.31, **changes):

@@ -7,20 +7,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import validation.estimates.quadrature as module
-from analytic.errors import InputError
-from reference.quadrature import area_lights
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.ray_values import ReferenceImage
-from reference.quadrature.replicates import PointPlan
-from reference.scene.read import read_reference
-from reference.scene.shadow_epsilon import measure_shadow_epsilon
-from tests.helpers.area_lights import NULL, fog, lamp, lit_scene
-from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.agreement import layer_masks, reference_estimate
-from validation.estimates.images import layered_reference
-from validation.estimates.monte_carlo import monte_carlo_batches
-from validation.estimates.quadrature import (
+import airlight.validation.estimates.quadrature as module
+from airlight.analytic.errors import InputError
+from airlight.reference.quadrature import area_lights
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.scene.read import read_reference
+from airlight.reference.scene.shadow_epsilon import measure_shadow_epsilon
+from airlight.validation.estimates.agreement import layer_masks, reference_estimate
+from airlight.validation.estimates.images import layered_reference
+from airlight.validation.estimates.monte_carlo import monte_carlo_batches
+from airlight.validation.estimates.quadrature import (
     known_to,
     known_words,
     reference_error,
@@ -28,9 +26,11 @@ from validation.estimates.quadrature import (
     reference_layer,
     reference_of_pixels,
 )
-from validation.scenes.loading import LoadedScene, load_scene
-from validation.statistics.comparison import NoisyImage, compare_statistics
-from validation.statistics.estimate import Estimate
+from airlight.validation.scenes.loading import LoadedScene, load_scene
+from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
+from airlight.validation.statistics.estimate import Estimate
+from tests.helpers.area_lights import NULL, fog, lamp, lit_scene
+from tests.helpers.scenes import spot, tiny_scene
 
 
 @pytest.fixture
@@ -41,16 +41,16 @@ def scene(variant):
 @pytest.fixture
 def computed(monkeypatch):
     """Count how often a reference image is computed."""
-    import validation.estimates.quadrature
+    import airlight.validation.estimates.quadrature
 
     calls = []
-    compute = validation.estimates.quadrature.quadrature_image
+    compute = airlight.validation.estimates.quadrature.quadrature_image
 
     def counted(*args, **kwargs):
         calls.append(kwargs)
         return compute(*args, **kwargs)
 
-    monkeypatch.setattr(validation.estimates.quadrature, "quadrature_image", counted)
+    monkeypatch.setattr(airlight.validation.estimates.quadrature, "quadrature_image", counted)
     return calls
 
 

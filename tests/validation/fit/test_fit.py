@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.scene.read import read_reference
-from reference.storage.exr import Image
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.exr import Image
+from airlight.validation.engine.prediction import Guess, Predictor, SceneLight
+from airlight.validation.engine.seen import Seen
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.fit.fit import fit_image
+from airlight.validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
+from airlight.validation.fit.unknowns import read_unknowns
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.scenes import scene_xml
-from validation.engine.prediction import Guess, Predictor, SceneLight
-from validation.engine.seen import Seen
-from validation.estimates.quadrature import reference_image
-from validation.fit.fit import fit_image
-from validation.fit.solve import Model, interval_ends, robust_fit, weighted_fit
-from validation.fit.unknowns import read_unknowns
-from validation.scenes.loading import load_scene
 
 SIZE = (48, 36)
 TOOLS = Path(__file__).resolve().parents[3] / "docs/tools"

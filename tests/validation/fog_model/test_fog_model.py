@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import ReferenceLight, read_reference
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import ReferenceLight, read_reference
+from airlight.validation.fog_model.radiance import FogModel, scene_fog
+from airlight.validation.fog_model.view import _level, scattering_paths, view_of
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.height_fog import LAMP, SPOT, SUN, fog_xml
-from validation.fog_model.radiance import FogModel, scene_fog
-from validation.fog_model.view import _level, scattering_paths, view_of
-from validation.scenes.loading import load_scene
 
 SIZE = (24, 18)
 

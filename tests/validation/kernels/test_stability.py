@@ -8,20 +8,27 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from analytic.phase import PHASE_NAMES, PhaseFunction
-from realtime.errors import InputError as RealtimeInputError
-from realtime.kernels.registry import Kernel
-from realtime.kernels.stepping import quadrature
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import PHASE_NAMES, PhaseFunction
+from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.realtime.kernels.registry import Kernel
+from airlight.realtime.kernels.stepping import quadrature
+from airlight.validation.kernels.benchmark import speed_against_error, timed_in_turns, try_kernel
+from airlight.validation.kernels.case_files import read_cases
+from airlight.validation.kernels.cases import (
+    TABLE,
+    evaluate_accepted,
+    evaluate_cases,
+    integrate_cases,
+    summary,
+    write_results,
+)
+from airlight.validation.kernels.errors import errors_by_group, groups
+from airlight.validation.kernels.rays import hard_rays, table, wide_rays, with_reference
+from airlight.validation.kernels.records import KernelCost, RayTime
+from airlight.validation.kernels.stability import GENERATED, _broken, kernel_stability
 from tests.evidence.certified.integral import integrate_certified
 from tests.helpers.kernel_values import take
-from validation.kernels.benchmark import speed_against_error, timed_in_turns, try_kernel
-from validation.kernels.case_files import read_cases
-from validation.kernels.cases import TABLE, evaluate_accepted, evaluate_cases, integrate_cases, summary, write_results
-from validation.kernels.errors import errors_by_group, groups
-from validation.kernels.rays import hard_rays, table, wide_rays, with_reference
-from validation.kernels.records import KernelCost, RayTime
-from validation.kernels.stability import GENERATED, _broken, kernel_stability
 
 
 def gauss(geometry, x0, x1, medium, light):

@@ -8,12 +8,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from validation.columns import plain
-from validation.metrics.colour import ciede2000, colour_difference, delta_e_itp
-from validation.metrics.errors import error_metrics
-from validation.metrics.flip import flip_hdr
-from validation.metrics.other_tools import PublishedErrors, published_errors
+from airlight.analytic.errors import InputError
+from airlight.validation.columns import plain
+from airlight.validation.metrics.colour import ciede2000, colour_difference, delta_e_itp
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.metrics.flip import flip_hdr
+from airlight.validation.metrics.other_tools import PublishedErrors, published_errors
 
 EXACT = 1e-14  # some roundings of double precision
 
@@ -205,7 +205,7 @@ def test_published_pair_of_delta_e_itp():
 
 @pytest.mark.parametrize(("a", "b"), [(0.5, 0.6), (0.01, 0.02), (1.0, 4.0)])
 def test_grey_differs_in_lightness_alone(a, b, monkeypatch):
-    monkeypatch.setattr("validation.metrics.colour.auto_exposure", lambda reference: 0.0)
+    monkeypatch.setattr("airlight.validation.metrics.colour.auto_exposure", lambda reference: 0.0)
     difference = colour_difference(grey(a), grey(b))
     expected = 720 * abs(perceptual_quantiser(203 * a) - perceptual_quantiser(203 * b))
     # The rounded matrices give white a luminance that is wrong by 1e-4.

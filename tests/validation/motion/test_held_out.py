@@ -13,9 +13,9 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import t as student
 
-from validation.motion.measures import Measures, Sequence, measure
-from validation.statistics.estimate import Answer, Estimate
-from validation.statistics.samples import mean_of_series
+from airlight.validation.motion.measures import Measures, Sequence, measure
+from airlight.validation.statistics.estimate import Answer, Estimate
+from airlight.validation.statistics.samples import mean_of_series
 
 FRAMES, HEIGHT, WIDTH = 30, 29, 45
 WEIGHT, SIGMA, FRACTION, AGE = 0.2, 0.08, 0.25, 4

@@ -7,13 +7,13 @@ import re
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, write_exr
-from validation.columns import plain
-from validation.estimates.quadrature import reference_image
-from validation.motion import judge
-from validation.motion.judge import compare_frames
-from validation.scenes.loading import load_scene
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.validation.columns import plain
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.motion import judge
+from airlight.validation.motion.judge import compare_frames
+from airlight.validation.scenes.loading import load_scene
 
 SIZE = (32, 24)
 FRAMES = 8

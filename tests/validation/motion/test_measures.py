@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from validation.columns import plain
-from validation.motion.judge import motion_verdict
-from validation.motion.measures import Measures, Sequence, mean_measures, measure
-from validation.statistics.estimate import Answer
+from airlight.validation.columns import plain
+from airlight.validation.motion.judge import motion_verdict
+from airlight.validation.motion.measures import Measures, Sequence, mean_measures, measure
+from airlight.validation.statistics.estimate import Answer
 
 FRAMES, HEIGHT, WIDTH = 40, 24, 32
 WEIGHT = 0.1  # of the new frame in an exponential average

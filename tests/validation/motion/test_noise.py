@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from reference.storage.exr import Image, write_exr
-from validation.columns import plain
-from validation.estimates.quadrature import reference_image
-from validation.motion.blocks import parts_of_error
-from validation.motion.noise import Noise, compare_runs, detectable, measure_noise
-from validation.scenes.loading import load_scene
-from validation.statistics.estimate import Answer
-from validation.statistics.samples import student
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.exr import Image, write_exr
+from airlight.validation.columns import plain
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.motion.blocks import parts_of_error
+from airlight.validation.motion.noise import Noise, compare_runs, detectable, measure_noise
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.statistics.estimate import Answer
+from airlight.validation.statistics.samples import student
 
 REFERENCE = np.linspace(0.5, 1.5, 24 * 32 * 3).reshape(24, 32, 3)
 SIGMA = 0.2

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realtime.kernels.exact import exact
-from realtime.kernels.taylor import taylor
-from realtime.scene.read_scene import read_scene
-from validation.kernels.cases import evaluate_cases, relative_error
-from validation.kernels.rays import wide_rays
-from validation.papers import billeter_tables, biri_tables, soft_shafts
-from validation.papers.claims import (
+from airlight.realtime.kernels.exact import exact
+from airlight.realtime.kernels.taylor import taylor
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.kernels.cases import evaluate_cases, relative_error
+from airlight.validation.kernels.rays import wide_rays
+from airlight.validation.papers import billeter_tables, biri_tables, soft_shafts
+from airlight.validation.papers.claims import (
     DIRECTIONS,
     EFFORTS,
     QUARTILES,
@@ -30,11 +30,11 @@ from validation.papers.claims import (
     taken,
     verdict,
 )
-from validation.papers.formulas import _annex, _cloud_equations, _droplets
-from validation.papers.scattering import fitted_constant, left_over
-from validation.papers.shadow_planes import drawn
-from validation.scenes.loading import load_scene
-from validation.statistics.estimate import Answer
+from airlight.validation.papers.formulas import _annex, _cloud_equations, _droplets
+from airlight.validation.papers.scattering import fitted_constant, left_over
+from airlight.validation.papers.shadow_planes import drawn
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.statistics.estimate import Answer
 
 MEASURED = json.loads(Path(__file__).with_name("figures.json").read_text(encoding="utf-8"))
 JUDGED = [claim for claim in claims() if claim.direction]

@@ -4,12 +4,12 @@
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.methods.registry import METHODS
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.estimates.images import Budget, monte_carlo_reference
+from airlight.validation.scenes.loading import LoadedScene
 from tests.helpers.clouds import SUN, cloud, loaded, ring
-from validation.estimates.images import Budget, monte_carlo_reference
-from validation.scenes.loading import LoadedScene
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -7,9 +7,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.clouds.collector_search import Collector
-from validation.papers import clouds
-from validation.timing import Timing
+from airlight.realtime.clouds.collector_search import Collector
+from airlight.validation.papers import clouds
+from airlight.validation.timing import Timing
 
 
 def test_a_ratio_of_light_has_the_interval_of_the_paths():

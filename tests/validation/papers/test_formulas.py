@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analytic.panels import airlight_segments
-from analytic.phase import PhaseFunction
-from validation.papers import formulas
-from validation.papers.formulas import _angular_form, _compared, _moderate, _over_angle, _over_distance, _worst
+from airlight.analytic.panels import airlight_segments
+from airlight.analytic.phase import PhaseFunction
+from airlight.validation.papers import formulas
+from airlight.validation.papers.formulas import _angular_form, _compared, _moderate, _over_angle, _over_distance, _worst
 
 
 def test_both_forms_of_the_integral_are_that_of_the_panels():

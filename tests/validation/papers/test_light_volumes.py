@@ -4,14 +4,14 @@
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import render_frame
-from realtime.methods.light_volumes.published.mesh import VolumeMesh, volume_mesh
-from realtime.methods.light_volumes.published.tessellation import divide, triangles
-from realtime.scene.read_scene import read_scene
-from realtime.shadow_maps.shadow_map import cast_shadow_map
-from validation.papers import light_volumes
-from validation.papers.light_volumes import laplacian, plain_edges, quad_levels
-from validation.scenes.loading import load_scene
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.methods.light_volumes.published.mesh import VolumeMesh, volume_mesh
+from airlight.realtime.methods.light_volumes.published.tessellation import divide, triangles
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
+from airlight.validation.papers import light_volumes
+from airlight.validation.papers.light_volumes import laplacian, plain_edges, quad_levels
+from airlight.validation.scenes.loading import load_scene
 
 SIDE = 16  # texels
 

@@ -7,9 +7,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.scene.read_scene import read_scene
-from validation.papers import scattering
-from validation.papers.claims import INTERVAL, Figure
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.papers import scattering
+from airlight.validation.papers.claims import INTERVAL, Figure
 
 
 def test_multiple_scattering_is_the_worst_of_the_scenes_and_the_fraction_of_thin_fog(variant, monkeypatch):

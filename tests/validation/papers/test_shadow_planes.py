@@ -5,8 +5,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from validation.papers import shadow_planes
-from validation.papers.shadow_planes import _lit_length, drawn, stencil
+from airlight.validation.papers import shadow_planes
+from airlight.validation.papers.shadow_planes import _lit_length, drawn, stencil
 
 
 def test_lit_lengths_by_hand():

@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
-from realtime.clouds.canonical.coordinates import SETS
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from validation.papers import slab
-from validation.papers.slab import TransportCurve, crossing
+from airlight.realtime.clouds.canonical.coordinates import SETS
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from airlight.validation.papers import slab
+from airlight.validation.papers.slab import TransportCurve, crossing
 
 
 def test_a_level_is_crossed_by_a_power_law():

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from realtime.scene.read_scene import read_scene
-from validation.papers import soft_shafts
-from validation.papers.soft_shafts import RENDERINGS, VARIANTS, Reference
-from validation.scenes.loading import load_scene
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.papers import soft_shafts
+from airlight.validation.papers.soft_shafts import RENDERINGS, VARIANTS, Reference
+from airlight.validation.scenes.loading import load_scene
 
 HEIGHT, WIDTH = 8, 32
 

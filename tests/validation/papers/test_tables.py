@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.scene.read_scene import read_scene
-from validation.papers import billeter_tables, biri_tables
-from validation.papers.billeter_tables import attempted, frame_within, sampled, table_scene
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.papers import billeter_tables, biri_tables
+from airlight.validation.papers.billeter_tables import attempted, frame_within, sampled, table_scene
 
 
 def test_a_small_table_of_biri(variant, monkeypatch):

@@ -7,12 +7,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.scene.read_scene import read_scene
-from validation.properties.properties import scene_properties
-from validation.scenes.loading import load_scene
-from validation.scenes.meshes import box, grid, placed, scaled
-from validation.scenes.parts import camera, fog, mitsuba_mesh, point_light
-from validation.scenes.registry import FOG_SCENES
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.properties.properties import scene_properties
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.meshes import box, grid, placed, scaled
+from airlight.validation.scenes.parts import camera, fog, mitsuba_mesh, point_light
+from airlight.validation.scenes.registry import FOG_SCENES
 
 
 def _scene(scale=1.0, *, sigma_t=0.37, lamp=(0.3, 0.1, 5.0), extra=None):

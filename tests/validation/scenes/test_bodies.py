@@ -5,10 +5,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
+from airlight.analytic.errors import InputError
+from airlight.validation.scenes.bodies import check_bodies
+from airlight.validation.scenes.meshes import box, icosphere, joined, placed, torus
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, loaded, ring
-from validation.scenes.bodies import check_bodies
-from validation.scenes.meshes import box, icosphere, joined, placed, torus
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -9,16 +9,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.frame.incremental import next_frame
-from realtime.methods.registry import FOG_METHODS
-from realtime.scene.read_scene import read_again, read_scene
-from reference.scene.read import read_reference
-from validation.scenes.animation import animate, moved_parts
-from validation.scenes.changes import change_scene, change_words, changeable, parse_changes
-from validation.scenes.loading import load_scene
-from validation.scenes.registry import SCENES
-from validation.study.configuration import configuration, prepared
+from airlight.analytic.errors import InputError
+from airlight.realtime.frame.incremental import next_frame
+from airlight.realtime.methods.registry import FOG_METHODS
+from airlight.realtime.scene.read_scene import read_again, read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.animation import animate, moved_parts
+from airlight.validation.scenes.changes import change_scene, change_words, changeable, parse_changes
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.registry import SCENES
+from airlight.validation.study.configuration import configuration, prepared
 
 pytestmark = pytest.mark.usefixtures("variant")
 

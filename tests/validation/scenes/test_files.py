@@ -7,18 +7,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.droplets import optics
-from analytic.errors import InputError
-from realtime.errors import InputError as RealtimeInputError
-from realtime.scene.read_scene import read_scene
-from reference.quadrature.image import quadrature_image
-from reference.quadrature.replicates import PointPlan
-from reference.scene.read import read_reference
+from airlight.analytic.droplets import optics
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.quadrature.replicates import PointPlan
+from airlight.reference.scene.read import read_reference
+from airlight.validation.estimates.agreement import agreements
+from airlight.validation.scenes.files.references import touching
+from airlight.validation.scenes.loading import LoadedScene, load_scene
+from airlight.validation.scenes.parts import camera, fog, point_light, tabulated_phase
 from tests.helpers.frames import render
-from validation.estimates.agreement import agreements
-from validation.scenes.files.references import touching
-from validation.scenes.loading import LoadedScene, load_scene
-from validation.scenes.parts import camera, fog, point_light, tabulated_phase
 
 COEFFICIENTS = '<float name="sigma_t" value="0.23"/><float name="albedo" value="0.83"/>'
 FOG = f'<medium type="homogeneous" id="fog">{COEFFICIENTS}</medium>'
@@ -272,7 +272,7 @@ def test_every_plugin_of_mitsuba_is_taken_or_refused_in_one_line(load):
     """By all readers, one plugin at a time, with Mitsuba's defaults where it has some."""
     from pathlib import Path
 
-    from reports.interchange.scene import describe_scene
+    from airlight.reports.interchange.scene import describe_scene
 
     kinds = ("Sensor", "Emitter", "Shape", "BSDF", "Medium", "PhaseFunction")
     folder = Path(mi.__file__).parent / "plugins"

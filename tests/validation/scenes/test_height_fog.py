@@ -7,14 +7,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from analytic.height_fog import HeightFog, Layer
-from reference.quadrature.height_fog import fog_of
-from reference.scene.read import read_reference
+from airlight.analytic.errors import InputError
+from airlight.analytic.height_fog import HeightFog, Layer
+from airlight.reference.quadrature.height_fog import fog_of
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.engine_fog import ENGINES, layers_of, parameters_of
+from airlight.validation.scenes.height_fog import register_height_fog
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.height_fog import FOG, LAMP, SPOT, SUN, fog_xml
-from validation.scenes.engine_fog import ENGINES, layers_of, parameters_of
-from validation.scenes.height_fog import register_height_fog
-from validation.scenes.loading import load_scene
 
 
 @pytest.fixture

@@ -7,12 +7,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_reference
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.bad_inputs import cloud, scene
 from tests.helpers.scenes import scene_xml
-from validation.scenes.loading import load_scene
 
 SMALL = scene_xml(size=(16, 12), fov=41.7)
 

@@ -6,10 +6,10 @@ import tomllib
 import numpy as np
 import pytest
 
+from airlight.validation.scenes.hypertexture import NOISE_BOUND, gradient_noise, octaves
+from airlight.validation.scenes.meshes import arch, box, gem, icosphere, lathe, prism, star, tetrahedron, torus
+from airlight.validation.scenes.registry import FILES, mesh_of
 from tests.helpers.meshes import is_closed, volume
-from validation.scenes.hypertexture import NOISE_BOUND, gradient_noise, octaves
-from validation.scenes.meshes import arch, box, gem, icosphere, lathe, prism, star, tetrahedron, torus
-from validation.scenes.registry import FILES, mesh_of
 
 TABLES = tomllib.loads(FILES[0].read_text())
 PEN, COLUMN = TABLES["two-pens"]["kinds"]["pen"] | {"height": 1.83}, TABLES["colonnade"]["kinds"]["column"]

@@ -8,16 +8,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.errors import InputError as MethodsInputError
-from realtime.scene.read_scene import read_scene
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
-from reference.storage.exr import Image, read_exr, write_exr
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as MethodsInputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.exr import Image, read_exr, write_exr
+from airlight.validation.scenes.files.camera import clip_notes
+from airlight.validation.scenes.files.media import mirrored_grids
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.bad_inputs import scene
-from validation.scenes.files.camera import clip_notes
-from validation.scenes.files.media import mirrored_grids
-from validation.scenes.loading import load_scene
 
 REFLECTANCE = '<bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf>'
 GRID = '<volume type="gridvolume" name="sigma_t"><string name="filename" value="{}"/></volume>'

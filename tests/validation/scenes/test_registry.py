@@ -8,13 +8,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.scene.read_scene import read_scene
-from reference.quadrature.light_airlight import lit_rays
-from reference.quadrature.surface import surface_hits
-from reference.scene.read import read_reference
-from reference.storage.scene_digest import scene_digest
-from validation.scenes.loading import load_scene
-from validation.scenes.registry import FILES, FOG_SCENES, SCENES
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.light_airlight import lit_rays
+from airlight.reference.quadrature.surface import surface_hits
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.scene_digest import scene_digest
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.registry import FILES, FOG_SCENES, SCENES
 
 #: As the records say.
 TRIANGLES = {"two-pens": 34_549, "three-media": 14_785, "clutter": 20_747, "hall": 107_514, "colonnade": 66_132}

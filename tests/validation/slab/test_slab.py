@@ -5,12 +5,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from analytic.phase import PhaseFunction
+from airlight.analytic.errors import InputError
+from airlight.analytic.phase import PhaseFunction
+from airlight.validation.slab.light import slab_numbers
+from airlight.validation.slab.phases import phase_pair, read_phase_file
+from airlight.validation.slab.request import slab_request
 from tests.helpers.hg_draine import hg_draine_moments
-from validation.slab.light import slab_numbers
-from validation.slab.phases import phase_pair, read_phase_file
-from validation.slab.request import slab_request
 
 
 def paired(first, second, errors):

@@ -10,11 +10,11 @@ import pytest
 from numpy.polynomial.legendre import legval
 from PythonicDISORT.pydisort import pydisort
 
-from realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase
-from validation.slab.light import slab_numbers
-from validation.slab.moments import DOWN, UP, SlabOrders, order_sets
-from validation.slab.radiance import slab_radiance
-from validation.slab.request import slab_request
+from airlight.realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase
+from airlight.validation.slab.light import slab_numbers
+from airlight.validation.slab.moments import DOWN, UP, SlabOrders, order_sets
+from airlight.validation.slab.radiance import slab_radiance
+from airlight.validation.slab.request import slab_request
 
 DATA = Path(__file__).parents[2] / "data"
 ALL = [(1, math.inf)]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analytic.errors import InputError
+from airlight.analytic.errors import InputError
+from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
 from tests.helpers.calibration import BATCHES, SIZE, around_one, monte_carlo
-from validation.statistics.comparison import NoisyImage, compare_statistics
 
 
 def test_hand_computed_values():
@@ -42,7 +42,7 @@ def test_students_law_and_welchs_degrees_of_freedom(monkeypatch):
     both = NoisyImage(np.ones((1, 1)), np.full((1, 1), 0.1), 4)
     p = 2 * stats.t.sf(0.1 * z / np.hypot(0.1, 0.1), 6)
     for factor, exceeding in ((0.999, 0), (1.001, 1)):
-        monkeypatch.setattr("validation.statistics.comparison.LEVEL", factor * p)
+        monkeypatch.setattr("airlight.validation.statistics.comparison.LEVEL", factor * p)
         assert compare_statistics(both, random).exceeding == exceeding
 
 

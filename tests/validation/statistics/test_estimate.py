@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
+from airlight.validation.statistics.estimate import UNKNOWN, Answer, Estimate, fact
 
 YES, NO, WHO_KNOWS = Answer.YES, Answer.NO, Answer.UNKNOWN
 

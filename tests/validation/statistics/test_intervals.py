@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.helpers.calibration import power
-from tests.helpers.reports import record_of, sampled, times
-from validation.statistics.comparison import LEVEL
-from validation.statistics.estimate import Answer
-from validation.statistics.noise import (
+from airlight.validation.statistics.comparison import LEVEL
+from airlight.validation.statistics.estimate import Answer
+from airlight.validation.statistics.noise import (
     chance,
     drift,
     growths,
@@ -19,7 +17,7 @@ from validation.statistics.noise import (
     slower_stages,
     spread,
 )
-from validation.statistics.samples import (
+from airlight.validation.statistics.samples import (
     LEAST,
     binomial_interval,
     binomial_p,
@@ -29,7 +27,9 @@ from validation.statistics.samples import (
     sidak,
     student_quantile,
 )
-from validation.timing import FrameTimes, TimeGrowth, Timing
+from airlight.validation.timing import FrameTimes, TimeGrowth, Timing
+from tests.helpers.calibration import power
+from tests.helpers.reports import record_of, sampled, times
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 12), (12, 12), (3, 40), (992, 1000), (0, 0)])

@@ -10,6 +10,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
 from tests.helpers.calibration import (
     BATCHES,
     SIZE,
@@ -23,7 +24,6 @@ from tests.helpers.calibration import (
     problems,
     spread_to_detect,
 )
-from validation.statistics.comparison import NoisyImage, compare_statistics
 
 pytestmark = pytest.mark.statistical
 

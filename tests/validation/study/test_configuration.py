@@ -8,15 +8,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.errors import InputError as MethodError
-from realtime.frame.renderer import render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.kernels.stepping import quadrature
-from realtime.methods.registry import FOG_METHODS
-from realtime.scene.read_scene import read_scene
-from tests.helpers.scenes import tiny_scene
-from validation.study.configuration import (
+from airlight.analytic.errors import InputError
+from airlight.realtime.errors import InputError as MethodError
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.kernels.stepping import quadrature
+from airlight.realtime.methods.registry import FOG_METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.study.configuration import (
     QUICK,
     STANDARD,
     Configuration,
@@ -27,7 +26,8 @@ from validation.study.configuration import (
     prepared,
     split_name,
 )
-from validation.study.study import parse_study, read_study
+from airlight.validation.study.study import parse_study, read_study
+from tests.helpers.scenes import tiny_scene
 
 
 def refused(text):
@@ -69,7 +69,7 @@ def test_kernels_of_ones_own_come_through_the_same_door(variant):
     scene = read_scene(mi.load_dict(tiny_scene(ball=None)))
     own, built_in = (
         render_frame(prepared(scene, configuration("unshadowed", kernel)))
-        for kernel in ("realtime.kernels.taylor:taylor", "taylor")
+        for kernel in ("airlight.realtime.kernels.taylor:taylor", "taylor")
     )
     np.testing.assert_array_equal(own.airlight, built_in.airlight)
 
@@ -118,7 +118,14 @@ def test_a_users_kernel_is_found_in_the_current_folder_and_says_where_it_fails(t
         kernel(0.0)
 
 
-NO_KERNELS = ("gone:function", "realtime.kernels:gone", "realtime.kernels.:x", ":x", "realtime.kernels:", "math:pi")
+NO_KERNELS = (
+    "gone:function",
+    "airlight.realtime.kernels:gone",
+    "airlight.realtime.kernels.:x",
+    ":x",
+    "airlight.realtime.kernels:",
+    "math:pi",
+)
 NO_NAMES = ("quadratur", "quadrature-", "quadrature-x", "quadrature-1.5", "-4", "", "quadrature--4")
 
 

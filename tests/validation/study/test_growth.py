@@ -7,15 +7,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.scene.read_scene import read_scene
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.clock import peak_memory
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.meshes import rotation
+from airlight.validation.study.configuration import configuration
+from airlight.validation.study.growth import growth, ladder, study_growth, subdivided, triangles_of, with_copies
+from airlight.validation.study.study import Measure, Study
 from tests.helpers.scenes import bounded_medium, tiny_scene
-from validation.clock import peak_memory
-from validation.scenes.loading import load_scene
-from validation.scenes.meshes import rotation
-from validation.study.configuration import configuration
-from validation.study.growth import growth, ladder, study_growth, subdivided, triangles_of, with_copies
-from validation.study.study import Measure, Study
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.37, 1.0, 1.7])

@@ -8,13 +8,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from validation.metrics.errors import Metrics
-from validation.scenes.random.design import random_name, random_parts
-from validation.study.configuration import Configuration
-from validation.study.keys import Made, cell_key, scene_identities
-from validation.study.row import COLUMNS, arrow_schema, property_names, row_values
-from validation.study.run import cell_row
-from validation.study.study import Cell, Measure
+from airlight.validation.metrics.errors import Metrics
+from airlight.validation.scenes.random.design import random_name, random_parts
+from airlight.validation.study.configuration import Configuration
+from airlight.validation.study.keys import Made, cell_key, scene_identities
+from airlight.validation.study.row import COLUMNS, arrow_schema, property_names, row_values
+from airlight.validation.study.run import cell_row
+from airlight.validation.study.study import Cell, Measure
 
 CELL = Cell("windows", (32, 24), (), Configuration("ray-march", None, (("steps", 4), ("map", 64))))
 MADE = Made("1.0", "ab", (("mitsuba", "3.9.1"),), "llvm_ad_rgb", "3.11.7")

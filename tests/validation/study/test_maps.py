@@ -36,19 +36,19 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import read_scene
+from airlight.analytic.errors import InputError
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.registry import Animation
+from airlight.validation.statistics.estimate import Answer
+from airlight.validation.study.causes import decompose
+from airlight.validation.study.configuration import Configuration, configuration, named_configurations, prepared
+from airlight.validation.study.growth import fitted_exponent
+from airlight.validation.study.variation import light_references, method_motion
 from tests.helpers.scenes import spot, tiny_scene
-from validation.estimates.quadrature import reference_image
-from validation.metrics.errors import error_metrics
-from validation.scenes.loading import load_scene
-from validation.scenes.registry import Animation
-from validation.statistics.estimate import Answer
-from validation.study.causes import decompose
-from validation.study.configuration import Configuration, configuration, named_configurations, prepared
-from validation.study.growth import fitted_exponent
-from validation.study.variation import light_references, method_motion
 
 # Steps enough that halving them changes no error below by more than 2 %.
 MARCH = {"steps": 1000, "shadow": "map"}

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from analytic.errors import InputError
-from validation.study.rows import PICTURES, ROWS, RowStore
+from airlight.analytic.errors import InputError
+from airlight.validation.study.rows import PICTURES, ROWS, RowStore
 
 pytest.importorskip("pyarrow", reason="the extra `sweep` is not installed")
 
@@ -42,7 +42,7 @@ def test_rows_stay_and_later_ones_replace(tmp_path):
 KILLED = """
 import os, sys
 from pathlib import Path
-from validation.study.rows import RowStore
+from airlight.validation.study.rows import RowStore
 with RowStore(Path(sys.argv[1])) as store:
     for key in "ab":
         store.add({"key": key, "status": "done", "picture": bytes(50_000)})

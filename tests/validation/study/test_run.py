@@ -10,27 +10,27 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analytic.errors import InputError
-from realtime.frame.renderer import FrameRenderer
-from realtime.memory import Memory
-from realtime.methods.unshadowed import unshadowed
-from realtime.scene.read_scene import SceneFeatures, read_scene
-from reference.quadrature.ray_values import ReferenceImage
-from reports.commands.main import run as run_command
+from airlight.analytic.errors import InputError
+from airlight.realtime.frame.renderer import FrameRenderer
+from airlight.realtime.memory import Memory
+from airlight.realtime.methods.unshadowed import unshadowed
+from airlight.realtime.scene.read_scene import SceneFeatures, read_scene
+from airlight.reference.quadrature.ray_values import ReferenceImage
+from airlight.reports.commands.main import run as run_command
+from airlight.validation.estimates.quadrature import reference_of_pixels
+from airlight.validation.metrics.errors import error_metrics
+from airlight.validation.study import cost as expected_work
+from airlight.validation.study import reference as sampled
+from airlight.validation.study import run as module
+from airlight.validation.study.configuration import STANDARD, Configuration, configuration, prepared
+from airlight.validation.study.cost import Work, check_work, reference_work
+from airlight.validation.study.reference import cell_reference, load_cell
+from airlight.validation.study.row import row_values
+from airlight.validation.study.run import run
+from airlight.validation.study.scene import check_reference, configurations_for, open_scene
+from airlight.validation.study.stated_errors import EXACT
+from airlight.validation.study.study import Cell, Checks, Measure, RandomScenes, Study
 from tests.helpers.scenes import tiny_scene
-from validation.estimates.quadrature import reference_of_pixels
-from validation.metrics.errors import error_metrics
-from validation.study import cost as expected_work
-from validation.study import reference as sampled
-from validation.study import run as module
-from validation.study.configuration import STANDARD, Configuration, configuration, prepared
-from validation.study.cost import Work, check_work, reference_work
-from validation.study.reference import cell_reference, load_cell
-from validation.study.row import row_values
-from validation.study.run import run
-from validation.study.scene import check_reference, configurations_for, open_scene
-from validation.study.stated_errors import EXACT
-from validation.study.study import Cell, Checks, Measure, RandomScenes, Study
 
 SIZE = (24, 18)
 MARCH = Configuration("ray-march", None, (("steps", 200),))
@@ -298,7 +298,7 @@ def test_without_patience_the_clock_decides_nothing(variant, own_cache, monkeypa
     quiet = checked(**exact)
     own_cache.rename(own_cache.with_name("other"))
     clock = SimpleNamespace(perf_counter=lambda: float(next(hours)), process_time=lambda: 0.0)
-    monkeypatch.setattr("analytic.clock.time", clock)
+    monkeypatch.setattr("airlight.analytic.clock.time", clock)
     busy = checked(**exact)
     assert quiet
     assert busy == quiet

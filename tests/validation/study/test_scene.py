@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from validation.study.scene import open_scene
-from validation.study.study import standard_study
+from airlight.validation.study.scene import open_scene
+from airlight.validation.study.study import standard_study
 
 
 @pytest.mark.claim("report-kept")

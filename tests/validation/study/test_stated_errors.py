@@ -7,17 +7,17 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_reference
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.parts import camera, fog, point_light, tabulated_phase
+from airlight.validation.study import stated_errors as bounds
+from airlight.validation.study.configuration import configuration
+from airlight.validation.study.reference import of_image
+from airlight.validation.study.run import run
+from airlight.validation.study.study import Cell, Measure
 from tests.helpers.frames import render
 from tests.helpers.scenes import bounded_medium
-from validation.estimates.quadrature import reference_image
-from validation.scenes.parts import camera, fog, point_light, tabulated_phase
-from validation.study import stated_errors as bounds
-from validation.study.configuration import configuration
-from validation.study.reference import of_image
-from validation.study.run import run
-from validation.study.study import Cell, Measure
 
 pytestmark = pytest.mark.usefixtures("variant", "own_cache")
 

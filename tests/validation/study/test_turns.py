@@ -5,18 +5,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.clock import Spent
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer
-from realtime.methods.registry import METHODS
-from realtime.scene.read_scene import read_scene
+from airlight.analytic.clock import Spent
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.clock import Piece, in_turns, time_in_turns, time_repeated, timing_of
+from airlight.validation.study import turns as module
+from airlight.validation.study.configuration import configuration
+from airlight.validation.study.study import Cell, Measure
+from airlight.validation.study.turns import time_cells, time_frame
+from airlight.validation.timing import ANCHORS, anchored
 from tests.helpers.scenes import tiny_scene
-from validation.clock import Piece, in_turns, time_in_turns, time_repeated, timing_of
-from validation.study import turns as module
-from validation.study.configuration import configuration
-from validation.study.study import Cell, Measure
-from validation.study.turns import time_cells, time_frame
-from validation.timing import ANCHORS, anchored
 
 
 @pytest.mark.claim("times-are-medians", tolerance="rounding")
@@ -141,8 +141,8 @@ def test_methods_take_turns_and_one_that_fails_in_a_turn_is_lost_alone(scene, mo
 
 @pytest.mark.claim("times-of-one-run")
 def test_a_method_of_the_user_takes_its_turns_in_its_process(variant, tmp_path):
-    from reports.machine.own_process import in_own_process
-    from validation.study.reference import load_cell
+    from airlight.reports.machine.own_process import in_own_process
+    from airlight.validation.study.reference import load_cell
 
     file = tmp_path / "mine.py"
     file.write_text("def fog(view):\n    return type(view.medium.albedo)(0.1)\n")

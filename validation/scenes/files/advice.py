@@ -8,8 +8,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from validation.scenes.files.nodes import kind, of_kind, properties, reached, used
+from airlight.analytic.errors import InputError
+from airlight.validation.scenes.files.nodes import kind, of_kind, properties, reached, used
 
 _PLACE = re.compile(r"\[[\w.]+(:\d+)?\]\s*")  # of Mitsuba's source, before its words
 #: What Mitsuba says, and what to do about it; the first that fits counts.

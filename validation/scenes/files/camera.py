@@ -10,8 +10,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from reference.scene.camera import camera_matrix
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.camera import camera_matrix
 
 _USUAL_NEAR = 1e-2  # Mitsuba's own near plane [m], of which files say nothing
 _OPAQUE = 17.0  # an optical depth: what is left of light beyond it is lost in the rounding of float32, exp(-17) = 2^-24

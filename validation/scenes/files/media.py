@@ -13,10 +13,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from reference.scene.transforms import matrix_of
-from validation.arrays import Array
-from validation.scenes.files.nodes import kind, of_kind, properties, references
+from airlight.analytic.errors import InputError
+from airlight.reference.scene.transforms import matrix_of
+from airlight.validation.arrays import Array
+from airlight.validation.scenes.files.nodes import kind, of_kind, properties, references
 
 _OLD = ("sigma_s", "sigma_a")
 

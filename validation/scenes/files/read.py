@@ -9,17 +9,27 @@ from typing import Any
 
 import mitsuba as mi
 
-from analytic.errors import InputError
-from reference.storage.files import temporary_folder
-from reference.storage.scene_digest import description_digest, give_description
-from validation.scenes.changes import give_lobes
-from validation.scenes.files.advice import check_colours, check_files, in_words
-from validation.scenes.files.camera import check_camera, clip_notes
-from validation.scenes.files.media import give_extinction, grey_densities, mirrored_grids, pass_where_no_material
-from validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
-from validation.scenes.files.references import leave_out_media, touching
-from validation.scenes.files.shapes import cylinders_as_meshes, lamps_as_rectangles, rooms_as_boxes, write_out_instances
-from validation.scenes.files.text import check_text
+from airlight.analytic.errors import InputError
+from airlight.reference.storage.files import temporary_folder
+from airlight.reference.storage.scene_digest import description_digest, give_description
+from airlight.validation.scenes.changes import give_lobes
+from airlight.validation.scenes.files.advice import check_colours, check_files, in_words
+from airlight.validation.scenes.files.camera import check_camera, clip_notes
+from airlight.validation.scenes.files.media import (
+    give_extinction,
+    grey_densities,
+    mirrored_grids,
+    pass_where_no_material,
+)
+from airlight.validation.scenes.files.nodes import kind, name_nodes, of_kind, properties, references
+from airlight.validation.scenes.files.references import leave_out_media, touching
+from airlight.validation.scenes.files.shapes import (
+    cylinders_as_meshes,
+    lamps_as_rectangles,
+    rooms_as_boxes,
+    write_out_instances,
+)
+from airlight.validation.scenes.files.text import check_text
 
 _TAKEN = {
     "Emitter": ("point", "spot", "directional", "area", "constant", "envmap"),

@@ -12,11 +12,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from analytic.errors import InputError
-from realtime.scene.mesh_adjacency import scene_of
-from reference.scene.camera import camera_matrix
-from validation.scenes.files.nodes import child, kind, of_kind, properties, references
-from validation.scenes.files.shapes import samples
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.mesh_adjacency import scene_of
+from airlight.reference.scene.camera import camera_matrix
+from airlight.validation.scenes.files.nodes import child, kind, of_kind, properties, references
+from airlight.validation.scenes.files.shapes import samples
 
 _OFF = 1e-4  # of a shape's size: how far beside it
 _TOUCHES = 1e-5  # of a point's coordinates: how near to a bound it is in it

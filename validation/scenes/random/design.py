@@ -21,9 +21,9 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from analytic.errors import InputError
-from validation.arrays import Array
-from validation.readers import Reader, read_named, read_number, read_table, read_toml
+from airlight.analytic.errors import InputError
+from airlight.validation.arrays import Array
+from airlight.validation.readers import Reader, read_named, read_number, read_table, read_toml
 
 FILE = Path(__file__).with_name("ranges.toml")  #: of ranges as they are drawn without a file of one's own
 

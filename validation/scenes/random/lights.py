@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from validation.arrays import Array
-from validation.scenes.random.design import Draws, Ranges
-from validation.scenes.random.media import Medium, depths, unit_airlight, view_rays
+from airlight.validation.arrays import Array
+from airlight.validation.scenes.random.design import Draws, Ranges
+from airlight.validation.scenes.random.media import Medium, depths, unit_airlight, view_rays
 
 AREA_KINDS = ("rectangle", "disk", "sphere")
 _FAR = 1e3  # where directional lights come from, in radii of the stage

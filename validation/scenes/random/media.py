@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analytic.phase import phase_from_words
-from validation.arrays import Array
-from validation.properties.view import optical_depths
-from validation.scenes.random.design import Draws, Ranges
+from airlight.analytic.phase import phase_from_words
+from airlight.validation.arrays import Array
+from airlight.validation.properties.view import optical_depths
+from airlight.validation.scenes.random.design import Draws, Ranges
 
 #: By kind, the radius of a ball that holds the body of half sizes 1, and of one within it.
 _BALLS = {"sphere": (1.0, 1.0), "ellipsoid": (1.0, 0.93), "gem": (1.0, 0.91), "box": (math.sqrt(3), 1.0)}

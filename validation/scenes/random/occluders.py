@@ -14,10 +14,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from analytic.errors import InputError
-from realtime.scene.mesh_adjacency import mesh_triangles
-from validation.arrays import Array
-from validation.scenes.meshes import (
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.mesh_adjacency import mesh_triangles
+from airlight.validation.arrays import Array
+from airlight.validation.scenes.meshes import (
     Mesh,
     box,
     gem,
@@ -34,8 +34,8 @@ from validation.scenes.meshes import (
     tetrahedron,
     torus,
 )
-from validation.scenes.random.design import Draws, Ranges
-from validation.scenes.random.lights import Light
+from airlight.validation.scenes.random.design import Draws, Ranges
+from airlight.validation.scenes.random.lights import Light
 
 _TRIES = 24
 _CAMERA = 0.31  # an occluder is as far from the camera at least, in radii of the stage

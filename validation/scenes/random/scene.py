@@ -16,16 +16,16 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from validation.arrays import Array
-from validation.columns import plain
-from validation.properties.view import LightPlace, distance, lit_points
-from validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
-from validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
-from validation.scenes.random.design import Draws, Ranges, random_parts, ranges_from, read_ranges
-from validation.scenes.random.lights import AREA_KINDS, Light, draw_lights
-from validation.scenes.random.media import Medium, draw_media
-from validation.scenes.random.occluders import Occluder, draw_ground, draw_occluders
-from validation.scenes.registry import Animation, SceneRecord
+from airlight.validation.arrays import Array
+from airlight.validation.columns import plain
+from airlight.validation.properties.view import LightPlace, distance, lit_points
+from airlight.validation.scenes.meshes import box, gem, icosphere, placed, rotation, scaled
+from airlight.validation.scenes.parts import camera, fog, light, medium_boundary, mitsuba_mesh, phase_function
+from airlight.validation.scenes.random.design import Draws, Ranges, random_parts, ranges_from, read_ranges
+from airlight.validation.scenes.random.lights import AREA_KINDS, Light, draw_lights
+from airlight.validation.scenes.random.media import Medium, draw_media
+from airlight.validation.scenes.random.occluders import Occluder, draw_ground, draw_occluders
+from airlight.validation.scenes.registry import Animation, SceneRecord
 
 _ATTEMPTS = 17
 _TABLE = 513  # values of a tabulated phase function

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from realtime.errors import InputError
-from realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
-from realtime.scene.lights import Light
-from realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
 
 #: Departure of an adaptive mesh from the shadow map that is allowed by default, relative to the depth.
 THRESHOLD = 1e-3

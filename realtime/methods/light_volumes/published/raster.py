@@ -46,12 +46,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from realtime.methods.interface.method import View
-from realtime.methods.light_volumes.published.mesh import VolumeMesh
-from realtime.rays import RayGeometry
-from realtime.scene.camera import Camera, ray_directions, read_camera
-from realtime.scene.lights import Light
-from realtime.scene.media.medium import LitRays
+from airlight.realtime.methods.interface.method import View
+from airlight.realtime.methods.light_volumes.published.mesh import VolumeMesh
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.camera import Camera, ray_directions, read_camera
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import LitRays
 
 BATCH = 1 << 22  #: lanes of one batch: some 0.3 GB
 

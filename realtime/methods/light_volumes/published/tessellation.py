@@ -36,7 +36,7 @@ from typing import Any
 
 import numpy as np
 
-from realtime.errors import InputError
+from airlight.realtime.errors import InputError
 
 #: The corners and the middles of the sides of a quad, counter-clockwise, as (column, row) in halves of a side.
 RING = ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1))

@@ -5,8 +5,8 @@ rendered before."""
 import numpy as np
 import pytest
 
-from realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from airlight.realtime.clouds.canonical.kept import keep, load_kept, medium_numbers
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 
 MEDIUM = medium_numbers(HenyeyGreensteinPhase(0.5), 0.95)
 

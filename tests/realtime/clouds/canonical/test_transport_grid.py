@@ -5,15 +5,15 @@ import drjit as dr
 import numpy as np
 import pytest
 
-import realtime.clouds.canonical.fit as fit_module
-import realtime.clouds.canonical.transport_grid as grid_module
-from realtime.clouds.canonical import coordinates
-from realtime.clouds.canonical.coordinates import SETS
-from realtime.clouds.canonical.directional_moments import DirectionalMoments
-from realtime.clouds.canonical.fit import _directions, fit_on_device, fit_transport
-from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from realtime.numerics.array_types import array_types
+import airlight.realtime.clouds.canonical.fit as fit_module
+import airlight.realtime.clouds.canonical.transport_grid as grid_module
+from airlight.realtime.clouds.canonical import coordinates
+from airlight.realtime.clouds.canonical.coordinates import SETS
+from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
+from airlight.realtime.clouds.canonical.fit import _directions, fit_on_device, fit_transport
+from airlight.realtime.clouds.canonical.transport_grid import canonical_transport, on_device
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from airlight.realtime.numerics.array_types import array_types
 
 PHASE, ALBEDO = HenyeyGreensteinPhase(0.5), 0.95
 SIDES = (11, 7, 5, 13, 5)

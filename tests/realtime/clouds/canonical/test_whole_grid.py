@@ -6,11 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from realtime.clouds.canonical.coordinates import LOWEST_SUN, SETS, THICKEST, THINNEST
-from realtime.clouds.canonical.transport_grid import canonical_transport, on_device
-from realtime.numerics.array_types import array_types
+from airlight.realtime.clouds.canonical.coordinates import LOWEST_SUN, SETS, THICKEST, THINNEST
+from airlight.realtime.clouds.canonical.transport_grid import canonical_transport, on_device
+from airlight.realtime.numerics.array_types import array_types
+from airlight.validation.slab.phases import phase_pair
 from tests.realtime.clouds.canonical.test_transport_grid import transport_at, values
-from validation.slab.phases import phase_pair
 
 
 def random_slabs(count, together=16):

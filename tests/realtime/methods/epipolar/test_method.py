@@ -5,19 +5,19 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import render_frame
-from realtime.methods.epipolar.min_max_tree import slice_heights
-from realtime.methods.epipolar.slices import image_slices, neighbour, pixel_number, slice_coordinate
-from realtime.methods.epipolar.walk import sum_lit_intervals
-from realtime.rays import RayGeometry
-from realtime.scene.read_scene import read_scene
-from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.methods.epipolar.min_max_tree import slice_heights
+from airlight.realtime.methods.epipolar.slices import image_slices, neighbour, pixel_number, slice_coordinate
+from airlight.realtime.methods.epipolar.walk import sum_lit_intervals
+from airlight.realtime.rays import RayGeometry
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers.frames import frame, reference_of, relative_rmse
 from tests.helpers.light_frames import SIZE as FRAME_SIZE
 from tests.helpers.light_frames import camera, coloured_fog, lamp
 from tests.helpers.scenes import spot, tiny_scene
-from validation.scenes.loading import load_scene
-from validation.study.configuration import configuration, prepared
 
 SIZE = (40, 30)
 #: Where the light is, seen from a camera at the origin that looks along +y with +z up.

@@ -8,16 +8,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.methods.froxel_fog.grid import Grid, accumulated, column_rays
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import Isotropic
-from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_reference
+from airlight.realtime.methods.froxel_fog.grid import Grid, accumulated, column_rays
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import Isotropic
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers import probes
 from tests.helpers.frames import frame, read, reference_of, relative_rmse, render
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
 from tests.helpers.suns import brick, pearl, sunny
-from validation.scenes.loading import load_scene
 
 COARSE = {"width": 5, "height": 4, "slices": 7, "far": 7.3}
 

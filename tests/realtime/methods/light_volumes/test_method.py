@@ -10,15 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realtime.errors import InputError
-from realtime.frame.renderer import image_frame, run_stages
-from realtime.methods.light_volumes.jump_search import _JUMP, with_walls
-from realtime.methods.light_volumes.published.mesh import volume_mesh
-from realtime.methods.light_volumes.texel_walls import PLACES, walled_heights
-from realtime.scene.read_scene import read_scene
-from realtime.shadow_maps.inverse_depth_field import inverse_depth_field
-from realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
-from reference.scene.read import read_reference
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import image_frame, run_stages
+from airlight.realtime.methods.light_volumes.jump_search import _JUMP, with_walls
+from airlight.realtime.methods.light_volumes.published.mesh import volume_mesh
+from airlight.realtime.methods.light_volumes.texel_walls import PLACES, walled_heights
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
+from airlight.reference.scene.read import read_reference
+from airlight.validation.estimates.quadrature import reference_image
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.frames import render, renderer
 from tests.helpers.light_frames import (
@@ -33,7 +34,6 @@ from tests.helpers.light_frames import (
     twin_of,
 )
 from tests.helpers.scenes import bounded_medium, clear_scene, spot, tiny_scene
-from validation.estimates.quadrature import reference_image
 
 #: One of a kind; beside the view the faces of the cube that a tile passes count.
 FEW = ("light beside the view", "light in view", "fence", "spot in view")
@@ -273,16 +273,18 @@ def test_a_mesh_is_for_media_without_bounds(variant):
 @pytest.mark.claim("memory-before-it-is-taken")
 @pytest.mark.parametrize("evaluation", EVALUATIONS)
 def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
-    import realtime.memory
-    import realtime.methods.light_volumes.method
+    import airlight.realtime.memory
+    import airlight.realtime.methods.light_volumes.method
 
     def never(*args):
         raise AssertionError("a map was cast")
 
     loaded = loaded_scene(size=(4, 4))
-    monkeypatch.setattr(realtime.memory, "usable_memory", lambda: realtime.memory.Memory(10**9, "this machine has"))
+    monkeypatch.setattr(
+        airlight.realtime.memory, "usable_memory", lambda: airlight.realtime.memory.Memory(10**9, "this machine has")
+    )
     with monkeypatch.context() as patch:
-        patch.setattr(realtime.methods.light_volumes.method, "cast_shadow_map", never)
+        patch.setattr(airlight.realtime.methods.light_volumes.method, "cast_shadow_map", never)
         message = r"map: 4096 texels for 1 light\(s\): needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller"
         with pytest.raises(InputError, match=message):
             renderer(loaded, "light-volumes", map=4096, evaluation=evaluation)

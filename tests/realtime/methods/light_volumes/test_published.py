@@ -11,9 +11,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from realtime.methods.light_volumes.published.mesh import VolumeMesh, volume_mesh
-from realtime.methods.light_volumes.published.raster import signed_crossings
-from realtime.methods.light_volumes.published.tessellation import (
+from airlight.realtime.methods.light_volumes.published.mesh import VolumeMesh, volume_mesh
+from airlight.realtime.methods.light_volumes.published.raster import signed_crossings
+from airlight.realtime.methods.light_volumes.published.tessellation import (
     RING,
     _first_corner,
     _ring_offset,
@@ -23,9 +23,9 @@ from realtime.methods.light_volumes.published.tessellation import (
     quads,
     triangles,
 )
-from realtime.scene.camera import Camera, pixel_grid
-from realtime.scene.read_scene import read_scene
-from realtime.shadow_maps.shadow_map import cast_shadow_map
+from airlight.realtime.scene.camera import Camera, pixel_grid
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
 from tests.helpers.scenes import spot, tiny_scene
 
 # Tessellation --------------------------------------------------------------------------------------------------------

@@ -12,14 +12,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import read_scene
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
-from validation.metrics.errors import FLOOR
-from validation.scenes.meshes import box, joined, placed
-from validation.scenes.parts import camera, fog, mitsuba_mesh, point_light
-from validation.study.configuration import configuration, prepared
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.validation.metrics.errors import FLOOR
+from airlight.validation.scenes.meshes import box, joined, placed
+from airlight.validation.scenes.parts import camera, fog, mitsuba_mesh, point_light
+from airlight.validation.study.configuration import configuration, prepared
 
 SIZE = (20, 16)
 

@@ -5,13 +5,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.parts import mitsuba_mesh
 from tests.helpers.frames import render
 from tests.helpers.light_frames import camera, coloured_fog, lamp
 from tests.helpers.occluders import ALL, SOUND
 from tests.helpers.scenes import spot, tiny_scene
-from validation.scenes.parts import mitsuba_mesh
 
 SHIFT = np.array([0.0, 0.0, 0.9])
 

@@ -10,14 +10,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import realtime.methods.shadow_planes.plane_table as module
-from realtime.errors import InputError
-from realtime.methods.shadow_planes.plane_table import NUMBER, index_planes, light_basis, planes_of_rays
-from realtime.methods.shadow_planes.published_crossings import Buffer, _entry_key, sum_crossings
-from realtime.methods.shadow_planes.sweep import ray_planes, sum_lit_intervals
-from realtime.numerics.array_types import array_types
-from realtime.numerics.functions import host_diamond_angle
-from realtime.scene.mesh_adjacency import make_occluders
+import airlight.realtime.methods.shadow_planes.plane_table as module
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.shadow_planes.plane_table import NUMBER, index_planes, light_basis, planes_of_rays
+from airlight.realtime.methods.shadow_planes.published_crossings import Buffer, _entry_key, sum_crossings
+from airlight.realtime.methods.shadow_planes.sweep import ray_planes, sum_lit_intervals
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.numerics.functions import host_diamond_angle
+from airlight.realtime.scene.mesh_adjacency import make_occluders
 from tests.helpers.occluders import ALL
 
 LIGHT = np.array([1.23, -0.87, 1.61])

@@ -6,16 +6,16 @@ from functools import partial
 import numpy as np
 import pytest
 
-import realtime.methods.shadow_planes.published_mesh as module
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import read_scene
+import airlight.realtime.methods.shadow_planes.published_mesh as module
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.parts import mitsuba_mesh
+from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import frames
 from tests.helpers.frames import relative_rmse
 from tests.helpers.occluders import closed_sphere
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
-from validation.scenes.loading import load_scene
-from validation.scenes.parts import mitsuba_mesh
-from validation.study.configuration import configuration, prepared
 
 
 def frame(parameters):

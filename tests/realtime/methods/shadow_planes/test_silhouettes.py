@@ -10,14 +10,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from realtime.methods.shadow_planes.plane_table import layers_between, light_basis
-from realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
-from realtime.scene.camera import read_camera
-from realtime.scene.mesh_adjacency import make_occluders
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.methods.shadow_planes.plane_table import layers_between, light_basis
+from airlight.realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
+from airlight.realtime.scene.camera import read_camera
+from airlight.realtime.scene.mesh_adjacency import make_occluders
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.scenes.meshes import grid
 from tests.helpers.occluders import ALL
 from tests.helpers.scenes import tiny_scene
-from validation.scenes.meshes import grid
 
 LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}
 

@@ -6,18 +6,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.frame import renderer
-from realtime.frame.renderer import render_frame
-from realtime.image_filters import Raster, depth_guide
-from realtime.methods.soft_shafts.sources import AUTO_WIDTH, few_pixels, penumbra_width
-from realtime.numerics.array_types import two_numbers
-from realtime.scene.read_scene import read_scene
+from airlight.realtime.frame import renderer
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.image_filters import Raster, depth_guide
+from airlight.realtime.methods.soft_shafts.sources import AUTO_WIDTH, few_pixels, penumbra_width
+from airlight.realtime.numerics.array_types import two_numbers
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import SHARED_POINTS, configuration, prepared
 from tests.helpers.frames import frame, relative_rmse
 from tests.helpers.lamps import lamp_scene
 from tests.helpers.scenes import bounded_medium, spot, tiny_scene
-from validation.estimates.quadrature import reference_image
-from validation.scenes.loading import load_scene
-from validation.study.configuration import SHARED_POINTS, configuration, prepared
 
 NONE = {"filter": "none", "surfaces": "ray"}
 

@@ -7,19 +7,19 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.renderer import render_frame
-from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_reference
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import render_frame
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.meshes import gem, icosphere, placed, prism, rotation
+from airlight.validation.scenes.parts import medium_boundary
+from airlight.validation.study.configuration import configuration, prepared
 from tests.helpers import airlight_sum, frames
 from tests.helpers.frames import read, relative_rmse
 from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 from tests.helpers.sunlit import ALONG, CUBE_AT, cube, fog_sphere, plank, rays, sun, unit
-from validation.estimates.quadrature import reference_image
-from validation.scenes.loading import load_scene
-from validation.scenes.meshes import gem, icosphere, placed, prism, rotation
-from validation.scenes.parts import medium_boundary
-from validation.study.configuration import configuration, prepared
 
 SMALL = (8, 6)
 SPHERE_AT, RADIUS = (-0.8, 0.4, 0.7), 0.6
@@ -133,7 +133,7 @@ def test_airlight_and_surfaces_are_those_of_the_reference(variant, name):
 
 def test_a_segment_whose_panels_run_out_is_refused(variant, monkeypatch):
     """A sum of some of the panels was a dark pixel in silence."""
-    monkeypatch.setattr("realtime.scene.media.bounded_rays._MOST", 1)
+    monkeypatch.setattr("airlight.realtime.scene.media.bounded_rays._MOST", 1)
     ball = bounded_medium({"type": "sphere", "center": [0.1, 0.1, 0.7], "radius": 0.4}, 3.1, (0.9, 0.8, 0.7))
     with pytest.raises(InputError, match=r"airlight of \d+ of 48 pixels is not finite.* more panels"):
         render(clear_scene(size=(8, 6), ball=ball))

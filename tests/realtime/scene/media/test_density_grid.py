@@ -6,18 +6,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import FOG_METHODS, METHODS
-from realtime.scene.media.density_grid import GridMedium
-from realtime.scene.read_scene import read_scene
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import FOG_METHODS, METHODS
+from airlight.realtime.scene.media.density_grid import GridMedium
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.density_grid import INSIDE, ROUGH, SPOT, grid_xml, volume
 from tests.helpers.frames import relative_rmse
 from tests.helpers.height_fog import LAMP, SUN
-from validation.scenes.loading import load_scene
 
 
 @pytest.fixture

@@ -7,28 +7,28 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.geometry import foot_and_height
-from analytic.height_fog import HeightFog as HostFog
-from analytic.height_fog import HeightRays as HostRays
-from analytic.height_fog import Layer as HostLayer
-from analytic.height_fog import height_fog_segments
-from analytic.phase import PhaseFunction
-from realtime.errors import InputError
-from realtime.frame.renderer import frame_renderer, render_frame
-from realtime.kernels.registry import KERNELS
-from realtime.methods.registry import METHODS
-from realtime.numerics.array_types import array_types
-from realtime.rays import ray_geometry
-from realtime.scene.lights import Light
-from realtime.scene.media.height_fog import HeightFog, Layer, phi
-from realtime.scene.phase import HenyeyGreenstein
-from realtime.scene.read_scene import read_scene
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
+from airlight.analytic.geometry import foot_and_height
+from airlight.analytic.height_fog import HeightFog as HostFog
+from airlight.analytic.height_fog import HeightRays as HostRays
+from airlight.analytic.height_fog import Layer as HostLayer
+from airlight.analytic.height_fog import height_fog_segments
+from airlight.analytic.phase import PhaseFunction
+from airlight.realtime.errors import InputError
+from airlight.realtime.frame.renderer import frame_renderer, render_frame
+from airlight.realtime.kernels.registry import KERNELS
+from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.numerics.array_types import array_types
+from airlight.realtime.rays import ray_geometry
+from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.height_fog import HeightFog, Layer, phi
+from airlight.realtime.scene.phase import HenyeyGreenstein
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.study.configuration import find_kernel
 from tests.helpers.frames import relative_rmse
 from tests.helpers.height_fog import LAMP, SPOT, SUN, Row, fog_xml, rows
-from validation.scenes.loading import load_scene
-from validation.study.configuration import find_kernel
 
 
 def ends_of(row):
@@ -143,7 +143,7 @@ def test_sixteen_nodes_in_w(variant):
 
 def test_a_segment_whose_panels_run_out_is_not_dark(variant, monkeypatch):
     """A frame refuses what is not finite; a sum of some of the panels was a dark pixel in silence."""
-    monkeypatch.setattr("realtime.scene.media.height_fog._MOST", 1)
+    monkeypatch.setattr("airlight.realtime.scene.media.height_fog._MOST", 1)
     errors = relative_errors(by_tag(*GENERIC), "double")
     finite = np.isfinite(errors)
     assert not finite.all()

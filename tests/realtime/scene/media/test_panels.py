@@ -7,13 +7,21 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from realtime.numerics.array_types import aligned_array, array_types
-from realtime.scene.closed_mesh import CELLS, Bounds, holds, mean_distance, mesh_bounds, plane_neighbours, radial_planes
-from realtime.scene.media.light_paths import LightPaths
-from realtime.scene.media.medium import Homogeneous
-from realtime.scene.phase import Isotropic
-from realtime.scene.read_media import make_bounded_medium
-from validation.scenes.meshes import box, gem, icosphere, placed, prism, rotation, scaled
+from airlight.realtime.numerics.array_types import aligned_array, array_types
+from airlight.realtime.scene.closed_mesh import (
+    CELLS,
+    Bounds,
+    holds,
+    mean_distance,
+    mesh_bounds,
+    plane_neighbours,
+    radial_planes,
+)
+from airlight.realtime.scene.media.light_paths import LightPaths
+from airlight.realtime.scene.media.medium import Homogeneous
+from airlight.realtime.scene.phase import Isotropic
+from airlight.realtime.scene.read_media import make_bounded_medium
+from airlight.validation.scenes.meshes import box, gem, icosphere, placed, prism, rotation, scaled
 
 TURN = rotation((0.3, 1.0, 0.2), 27.3)
 CENTRE = np.array([0.1, 0.2, 0.3])

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm, t
 
-from analytic.errors import InputError
-from realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
-from reference.monte_carlo.batches import merged
-from reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
-from reference.monte_carlo.cloud_paths.opacity import seen_clouds
-from reference.monte_carlo.volpath import volpath_orders_batch
-from reference.scene.clouds import read_clouds
+from airlight.analytic.errors import InputError
+from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
+from airlight.reference.monte_carlo.batches import merged
+from airlight.reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch
+from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds
+from airlight.reference.monte_carlo.volpath import volpath_orders_batch
+from airlight.reference.scene.clouds import read_clouds
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.meshes import box, grid, placed
+from airlight.validation.scenes.parts import camera, mitsuba_mesh, sky, sun
+from airlight.validation.slab.radiance import slab_radiance
 from tests.helpers.clouds import DROPLETS, SUN, cloud, cloud_scene, dense, length_inside, linear_between
-from validation.scenes.loading import load_scene
-from validation.scenes.meshes import box, grid, placed
-from validation.scenes.parts import camera, mitsuba_mesh, sky, sun
-from validation.slab.radiance import slab_radiance
 
 SETS = [("1", (1, 1)), ("2", (2, 2)), ("3-4", (3, 4)), ("5-inf", (5, math.inf))]
 

@@ -7,12 +7,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.monte_carlo.cloud_paths.integrator import SIDE
-from reference.monte_carlo.cloud_paths.tables import walk_scene
-from reference.monte_carlo.cloud_paths.walk import Targets, walk
-from reference.scene.clouds import read_clouds
-from validation.scenes.parts import sun as light
-from validation.scenes.registry import SCENES
+from airlight.reference.monte_carlo.cloud_paths.integrator import SIDE
+from airlight.reference.monte_carlo.cloud_paths.tables import walk_scene
+from airlight.reference.monte_carlo.cloud_paths.walk import Targets, walk
+from airlight.reference.scene.clouds import read_clouds
+from airlight.validation.scenes.parts import sun as light
+from airlight.validation.scenes.registry import SCENES
 
 COLUMNS = 32
 PERIODS, WIDTH, THICKNESS = 9, 500.0, 250.0  #: of the cloud, widths [m]

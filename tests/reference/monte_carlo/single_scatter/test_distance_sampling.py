@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from realtime.numerics.array_types import aligned_array
-from reference.monte_carlo.single_scatter import distance_sampling as ds
-from reference.monte_carlo.single_scatter.distance_sampling import (
+from airlight.realtime.numerics.array_types import aligned_array
+from airlight.reference.monte_carlo.single_scatter import distance_sampling as ds
+from airlight.reference.monte_carlo.single_scatter.distance_sampling import (
     Span,
     _terms,
     closest_approach,

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from reference.monte_carlo.batches import merged
-from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
+from airlight.reference.monte_carlo.batches import merged
+from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
 from tests.helpers.scenes import spot, tiny_scene
 from tests.helpers.suns import ball_over_floor, brick, pearl, sun, sunny
 

@@ -4,13 +4,13 @@
 import numpy as np
 import pytest
 
-from reference.monte_carlo.single_scatter.integrator import single_scatter_batch
-from reference.monte_carlo.volpath import volpath_batch
-from reference.quadrature.image import quadrature_image
-from reference.scene.read import read_reference
+from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
+from airlight.reference.monte_carlo.volpath import volpath_batch
+from airlight.reference.quadrature.image import quadrature_image
+from airlight.reference.scene.read import read_reference
+from airlight.validation.scenes.loading import load_scene
 from tests.helpers.density_grid import ROUGH, grid_xml, volume
 from tests.helpers.height_fog import fog_xml
-from validation.scenes.loading import load_scene
 
 SKY = '<emitter type="constant" id="sky"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>'
 PANEL = """<shape type="rectangle" id="panel">

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.monte_carlo.slab_walk.estimates import slab_estimate
-from reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
-from reference.monte_carlo.slab_walk.walk import Slab, walk
+from airlight.reference.monte_carlo.slab_walk.estimates import slab_estimate
+from airlight.reference.monte_carlo.slab_walk.scattering import HenyeyGreenstein, Tabulated
+from airlight.reference.monte_carlo.slab_walk.walk import Slab, walk
 
 DATA = Path(__file__).parents[3] / "data"
 GRID = (np.arange(200_000) + 0.5) / 200_000

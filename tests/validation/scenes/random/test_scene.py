@@ -8,16 +8,16 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from analytic.errors import InputError
-from realtime.scene.read_scene import read_scene
-from reference.scene.read import read_reference
-from reference.storage.scene_digest import scene_digest
-from validation.scenes.loading import load_scene
-from validation.scenes.meshes import grid
-from validation.scenes.parts import mitsuba_mesh
-from validation.scenes.random.design import COORDINATES, point, ranges_from
-from validation.scenes.random.lights import Light
-from validation.scenes.random.scene import draw_scene, drawn_values, with_reach
+from airlight.analytic.errors import InputError
+from airlight.realtime.scene.read_scene import read_scene
+from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.scene_digest import scene_digest
+from airlight.validation.scenes.loading import load_scene
+from airlight.validation.scenes.meshes import grid
+from airlight.validation.scenes.parts import mitsuba_mesh
+from airlight.validation.scenes.random.design import COORDINATES, point, ranges_from
+from airlight.validation.scenes.random.lights import Light
+from airlight.validation.scenes.random.scene import draw_scene, drawn_values, with_reach
 
 
 @pytest.mark.claim("random-valid", tolerance="none: both readers take seeds 0 to 47, with all that was drawn")
