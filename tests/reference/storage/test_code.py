@@ -142,7 +142,12 @@ def test_results_hang_on_the_code_that_computes_them_and_not_on_claims_of_papers
     for kind, (name, needed) in COMPUTED.items():
         names = closure(name)
         assert needed in names, kind
-        apart = ("airlight.validation.papers", "airlight.reports.commands", "airlight.reports.papers", "airlight.reports.tables")
+        apart = (
+            "airlight.validation.papers",
+            "airlight.reports.commands",
+            "airlight.reports.papers",
+            "airlight.reports.tables",
+        )
         assert not [each for each in names if each.startswith(apart)], kind
 
 
