@@ -153,7 +153,7 @@ def test_an_installed_wheel_does_its_work_beside_folders_of_its_names(wheel, hos
         ["list"],
         ["render", "open-fog", *small],
         ["render", "open-fog", *small, "--method", "mine.py:fog"],
-        ["report", "open-fog", "--quick", *small, "--method", "unshadowed", "-o", "out"],
+        ["report", "open-fog", "--quick", "--method", "unshadowed", "-o", "out"],
     ):
         command = [sys.executable, "-S", "-m", "airlight", *words]
         ran = subprocess.run(command, cwd=hostile, env=world, capture_output=True, text=True)
