@@ -26,7 +26,7 @@ def files_of_frame(scene: str, method: str) -> list[str]:
         render_frame(frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"]))
     finally:
         sys.setprofile(None)
-    paths = (Path(name) for name in passed)
+    paths = (Path(name).resolve() for name in passed)
     inside = (path.relative_to(ROOT).as_posix() for path in paths if path.is_relative_to(ROOT))
     return [name for name in inside if name.startswith("realtime/")]
 

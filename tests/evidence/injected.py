@@ -188,5 +188,6 @@ def _modules(where: str) -> list[ModuleType]:
     return [module for module in map(importlib.import_module, names) if not hasattr(module, "__path__")]
 
 
-def _loaded(packages: tuple[str, ...]) -> list[ModuleType]:
-    return [module for name, module in list(sys.modules.items()) if name.split(".")[0] in packages]
+def _loaded(rooms: tuple[str, ...]) -> list[ModuleType]:
+    places = tuple(f"airlight.{room}." for room in rooms)
+    return [module for name, module in list(sys.modules.items()) if name.startswith(places)]
