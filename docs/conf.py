@@ -7,7 +7,7 @@ from pathlib import Path
 _HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(_HERE.parent / "src"), str(_HERE / "_ext")]
 
-from airlight.reports import __version__  # noqa: E402 - found on the path set above
+from airlight import __version__  # noqa: E402 - found on the path set above
 
 project = "airlight"
 author = "the airlight authors"

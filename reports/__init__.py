@@ -19,5 +19,3 @@ Read in this order:
 - `sweep/`: what a sweep says, from its Parquet;
 - `commands/`: the command line, made of these functions.
 """
-
-__version__ = "1.0.0"

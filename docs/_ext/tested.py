@@ -66,4 +66,4 @@ def last_run() -> str:
         f"{run['passed']} passed, {run['failed']} failed, {run['skipped']} skipped in {run['seconds'] / 60:.0f} minutes"
     )
     compiled = f"kernels compiled {'quickly' if run.get('compilation') == 'quick' else 'in full'}"
-    return f"{run['date'][:10]}, commit {run['commit']}, {run['machine']}, {compiled}: {words}."
+    return f"{run['date'][:10]}, commit {run['commit'][:12]}, {run['machine']}, {compiled}: {words}."

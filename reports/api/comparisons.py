@@ -190,6 +190,7 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
             f"signed relative error, blue too dark, red too bright, from {ERROR_FLOOR:g} (white) to {ERROR_CEILING:g}"
         )
     from airlight.reference.storage.exr import write_exr
+    from airlight.reports.machine.environment import stamped
 
     relative = relative_error(np.where(seen, reference, np.nan), test)
     compared = ~np.isnan(relative)
@@ -199,7 +200,7 @@ def write_difference(path: Path, reference: Any, test: Any, *, kept: Any = None)
         "airlight:difference": "test - reference",
         "airlight:not_finite": int((seen & ~compared).any(axis=-1).sum()),
     }
-    write_exr(path, Image({"total": difference, "relative": shown}, attributes=attributes))
+    write_exr(path, stamped(Image({"total": difference, "relative": shown}, attributes=attributes)))
     return "test - reference in R, G, B, over the reference in the layer relative"
 
 

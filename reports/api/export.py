@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from airlight.analytic.errors import InputError
-from airlight.reports import __version__
+from airlight.reference.storage.build import build
 from airlight.reports.api.inputs import Files, one_error, output_files
 from airlight.reports.tables.record import Result
 
@@ -100,7 +100,7 @@ def export(
 
 def _head(kernel: str, language: str, phase: str, measured: str) -> str:
     return f"""// The airlight of a point light in homogeneous fog: kernel {kernel}, phase function {phase}, {language}.
-// Written by airlight {__version__} (airlight export {kernel} --language {language} --phase {phase}).
+// Written by airlight {build().words} (airlight export {kernel} --language {language} --phase {phase}).
 // SPDX-License-Identifier: MIT-0. Copy, change and sell it without a notice; there is no warranty.
 // Lengths in m, extinction in 1/m, intensity in W/sr, radiance in W/(m^2 sr).
 // Range: 0 <= x0 <= x1, sigma_t >= 0, -1 < g < 1. A ray that meets the light gives a large number.

@@ -4,7 +4,7 @@
 import io
 import platform
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from airlight.realtime.scene.read_scene import Scene, read_scene
-from airlight.reports import __version__
+from airlight.reference.storage.build import build
 from airlight.reports.cluster.run import Group, Outcome, Task, is_alone
 from airlight.reports.machine.environment import processor
 from airlight.reports.plotting.pictures import error_map, exposure, tone_mapped
@@ -104,7 +104,7 @@ def _keyed(images: Iterable[Iterable[Cell]], made: Made, scenes: dict[str, str])
 
 def row_without_numbers(cell: Cell, key: str, outcome: Outcome) -> dict[str, Any]:
     """Return the row of a cell that came to nothing: the outcome says why."""
-    origin = Origin(__version__, row_source()[:12])
+    origin = Origin(**asdict(build()), source=row_source()[:12])
     return row_values(cell_row(cell, status=outcome.status, reason=outcome.reason, key=key, origin=origin))
 
 
@@ -125,7 +125,7 @@ def _origin() -> Origin:
     from importlib.metadata import version
 
     return Origin(
-        airlight=__version__,
+        **asdict(build()),
         source=row_source()[:12],
         host=platform.node(),
         device=processor(),

@@ -22,7 +22,7 @@ import cyclopts
 import docstring_parser
 from cyclopts import App, Group, Parameter
 
-from airlight.reports import __version__
+from airlight.reference.storage.build import build
 from airlight.reports.api.compare import compare
 from airlight.reports.api.explore import describe, view
 from airlight.reports.api.export import export
@@ -177,6 +177,10 @@ def _printed(result: Result | None, files: Sequence[Path], *, json: bool) -> int
     return result.status
 
 
+def _version() -> str:
+    return f"airlight {build().words}"
+
+
 def make_app(words: Sequence[str] = ()) -> App:
     """Return the command line; only the command that is asked for is more than its name and its first sentence."""
     how: dict[str, Any] = {
@@ -186,9 +190,7 @@ def make_app(words: Sequence[str] = ()) -> App:
         "help_epilogue": "",
     }
     summary = "How fast, accurate and robust is a real-time method for volumetric light, against a checked reference?"
-    app = App(
-        name="airlight", help=summary, version=f"airlight {__version__}", suppress_keyboard_interrupt=False, **how
-    )
+    app = App(name="airlight", help=summary, version=_version, suppress_keyboard_interrupt=False, **how)
     app.help_epilogue, app.version_flags = _EPILOGUE, ("--version",)
     app["--help"].group = app["--version"].group = Group("Options", sort_key=99)
     for number, (title, functions) in enumerate(_PANELS.items()):

@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -65,11 +64,12 @@ def _workers() -> int:
 def _recorded(command: list[str], root: Path, variant: str) -> int:
     """Run all tests, write the record, and return the exit status."""
     from airlight.analytic.clock import stopwatch
+    from airlight.reference.storage.build import build
     from airlight.reference.storage.files import temporary_folder, write_text
     from airlight.reports.machine import quick_compilation
     from airlight.reports.machine.environment import describe_environment, machine_in_words
 
-    took = stopwatch()
+    took, made = stopwatch(), build()
     with temporary_folder() as folder:
         results = folder / "tests.xml"
         asked = [f"--junit-xml={results}", "--allowed-skips=.ci/skips", "--durations=40"]
@@ -83,7 +83,8 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
         "date": time.strftime("%Y-%m-%d %H:%M:%S %z"),
         "machine": machine_in_words(describe_environment() | {"variant": variant}),
         "compilation": "quick" if quick_compilation.is_asked_for() else "full",
-        "commit": _commit(),
+        "commit": made.commit,
+        "changed": made.changed,
         "seconds": round(took().seconds),
         "passed": tests - failed - errors - skipped,
         "failed": failed + errors,
@@ -92,11 +93,3 @@ def _recorded(command: list[str], root: Path, variant: str) -> int:
     write_text(root / RECORD, json.dumps(record, indent=1) + "\n")
     print(f"written: {root / RECORD}")
     return int(status != 0)
-
-
-def _commit() -> str:
-    """Return the commit of the checkout, 'unknown' without git or its history."""
-    with suppress(FileNotFoundError):
-        asked = ["git", "rev-parse", "--short", "HEAD"]
-        return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
-    return "unknown"

@@ -14,6 +14,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Any, get_args, get_type_hints
 
 from airlight.analytic.errors import InputError
+from airlight.reference.storage.build import Build
 from airlight.validation.columns import column, described, record_of
 from airlight.validation.kernels.records import Stability
 from airlight.validation.papers.claims import Claim as PaperClaim
@@ -47,6 +48,16 @@ class Environment:
     device: str | None = column(meaning="the GPU, where there is one", default=None)
     opengl: str | None = column(meaning="that draws shaders, and its error on certified integrals", default=None)
     llvm: str | None = None
+    build: Build | None = column(
+        meaning="airlight's version, its `commit` ('unknown' without git), whether files were `changed` since, and "
+        "`digest`, the SHA-256 of all its files; `null` in reports before 0.9",
+        default=None,
+    )
+
+    @property
+    def airlight(self) -> str:
+        """Which airlight it was: the version, and the commit and the digest where the report has them."""
+        return self.build.words if self.build else str(self.versions.get("airlight"))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -67,7 +67,9 @@ def _machines(old: Report, new: Report) -> tuple[bool, tuple[str, ...]]:
     pairs = {key: (getattr(before, key), getattr(after, key)) for key in _MACHINE}
     changes = [f"{key}: {was} -> {now}" for key, (was, now) in pairs.items() if was != now]
     same, versions = not changes, (before.versions, after.versions)
-    for name in sorted({*versions[0], *versions[1]}):
+    if before.airlight != after.airlight:
+        changes.append(f"airlight: {before.airlight} -> {after.airlight}")
+    for name in sorted({*versions[0], *versions[1]} - {"airlight"}):
         old_version, new_version = (installed.get(name) for installed in versions)
         changes += [f"{name}: {old_version} -> {new_version}"] if old_version != new_version else []
     if before.llvm != after.llvm:

@@ -13,6 +13,7 @@ import numpy as np
 
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.reference.storage.files import ensure_folder, write_text
+from airlight.reports.machine.environment import stamped
 from airlight.reports.machine.progress import Progress, sharing
 from airlight.reports.plotting.figure import ENDINGS, new_figure, picture_grid, save_figure
 from airlight.reports.plotting.pictures import exposure, tone_mapped
@@ -41,7 +42,7 @@ def write_figures(folder: Path, paper: str | None, *, quick: bool, progress: Pro
         written += [save_figure(target / f"{name}{ending}", figure.draw) for ending in ENDINGS]
         for file, radiance in figure.images.items():
             written.append(target / f"{name}-{file}.exr")
-            write_exr(written[-1], Image({"total": radiance}))
+            write_exr(written[-1], stamped(Image({"total": radiance})))
         if figure.rows:
             written.append(target / f"{name}.csv")
             write_text(written[-1], csv(table("", [Column(key, key) for key in figure.rows[0]], figure.rows)))

@@ -32,8 +32,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.reference.scene.read import read_reference
+from airlight.reference.storage.build import build
 from airlight.reference.storage.files import write_bytes
-from airlight.reports import __version__
 from airlight.reports.interchange.meshes import ShapeMesh, shape_mesh
 from airlight.reports.interchange.scene import describe_scene
 from airlight.validation.scenes.loading import LoadedScene
@@ -105,7 +105,7 @@ def _document(described: dict[str, Any], turn: Array, shapes: list[ShapeMesh]) -
         "KHR_materials_emissive_strength": extended,
     }
     document = {
-        "asset": {"version": "2.0", "generator": f"airlight {__version__}"},
+        "asset": {"version": "2.0", "generator": f"airlight {build().words}"},
         "extensionsUsed": [name for name, users in used.items() if users],
         "scene": 0,
         "scenes": [

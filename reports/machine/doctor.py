@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from airlight.analytic.clock import stopwatch
+from airlight.reference.storage.build import build
 from airlight.reports.machine.environment import (
     MissingError,
     atomic_problem,
@@ -197,7 +198,7 @@ def diagnose() -> Machine:
         problem = str(error)
     checks = [Check("platform", None, f"{platform.platform()}, {processor()}, {threads()} threads")]
     for name, version in versions().items():
-        details = f"{version}, {sys.executable}" if name == "python" else version
+        details = {"airlight": build().words, "python": f"{version}, {sys.executable}"}.get(name, version)
         checks.append(Check(name, version != "missing", details))
     libraries = find_llvm()
     for llvm in libraries:

@@ -10,12 +10,12 @@ import os
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airlight.reports import __version__
+from airlight.reference.storage.build import build
 from airlight.reports.machine import quick_compilation
 from airlight.reports.machine.gpu import cuda_status, optix_status
 from airlight.reports.machine.llvm import LLVM_VARIABLE, OLDEST_LLVM, Llvm, find_llvm
@@ -213,7 +213,7 @@ def versions() -> dict[str, str]:
     """Return the versions of airlight, Python and the packages that make the numbers."""
     from importlib.metadata import PackageNotFoundError, version
 
-    installed = {"airlight": __version__, "python": ".".join(map(str, sys.version_info[:3]))}
+    installed = {"airlight": build().airlight, "python": ".".join(map(str, sys.version_info[:3]))}
     for package in _PACKAGES:
         try:
             installed[package] = version(package)
@@ -223,8 +223,11 @@ def versions() -> dict[str, str]:
 
 
 def stamped(image: "Image") -> "Image":
-    """Return a layered image whose header names the versions that made it."""
-    named = {f"airlight:version:{key}": value for key, value in versions().items()}
+    """Return a layered image whose header names the versions and the build that made it."""
+    made, named = build(), {f"airlight:version:{key}": value for key, value in versions().items()}
+    named |= {"airlight:commit": made.commit, "airlight:digest": made.digest}
+    if made.changed is not None:
+        named["airlight:changed"] = str(made.changed).lower()
     return replace(image, attributes=dict(image.attributes) | named)
 
 
@@ -236,6 +239,7 @@ def describe_environment() -> dict[str, object]:
     variant = mitsuba.variant() if mitsuba else None
     environment: dict[str, object] = {
         "versions": versions(),
+        "build": asdict(build()),
         "platform": platform.platform(),
         "processor": processor(),
         "threads": threads(),

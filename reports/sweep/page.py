@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from airlight.reference.storage.build import build
 from airlight.reference.storage.files import ensure_folder, write_bytes, write_text
-from airlight.reports import __version__
 from airlight.reports.page.chart import svg_text
 from airlight.reports.page.filters import drawn, facts, percent, unbroken
 from airlight.reports.page.render import page_environment, template_text
@@ -87,7 +87,7 @@ def render_sweep(said: Summary, charts: Mapping[str, str]) -> str:
         "same": SAME,
         "named": NAMED,
         "least": LEAST,
-        "version": __version__,
+        "version": build().words,
         "css": Markup(template_text("report.css") + template_text("sweep.css")),
     }
 

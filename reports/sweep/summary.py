@@ -27,7 +27,7 @@ from airlight.validation.statistics.samples import LEVEL, binomial_interval
 SCHEMA = "airlight-sweep/1"
 
 #: Columns of the software and hardware that made the rows.
-_VERSIONS = ("airlight", "source", "mitsuba", "drjit", "python", "variant", "host", "device")
+_VERSIONS = ("airlight", "commit", "source", "mitsuba", "drjit", "python", "variant", "host", "device")
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from typing import Any
 
 import lazy_loader
 
-from airlight.reports import __version__
+__version__ = "0.9.0.dev0"  #: of the next release until it is made, see docs/tools/release.py
 
 
 class _Package(ModuleType):

@@ -89,7 +89,10 @@ class Origin:
     """Where and by what a row was computed."""
 
     airlight: str = column(meaning="version")
-    source: str = column(meaning="digest of airlight's source code, its first 12 digits")
+    commit: str = column(meaning="of airlight; 'unknown' where neither git nor who built the copy tells")
+    changed: bool | None = column(meaning="whether airlight's files differ from those of the commit")
+    digest: str = column(meaning="SHA-256 of airlight's files")
+    source: str = column(meaning="digest of the code that computes rows, comments apart, its first 12 digits")
     host: str | None = column(meaning="name of the machine", default=None)
     device: str | None = column(meaning="processor or GPU", default=None)
     variant: str | None = column(meaning="Mitsuba's variant", default=None)

@@ -11,6 +11,7 @@ import pytest
 from PIL import Image as Picture
 
 from airlight.analytic.errors import InputError
+from airlight.reference.storage.build import build
 from airlight.reference.storage.exr import Image, read_exr
 from airlight.reports.api.compare import compare
 from airlight.reports.api.results import Reference, RenderedFrames, Rendering, sealed, write_image
@@ -235,6 +236,7 @@ def test_save_writes_exr_and_png_and_refuses_others(tmp_path):
     read = read_exr(frame.save(tmp_path / "frame.exr"))
     np.testing.assert_array_equal(read.layers["airlight"], frame.airlight)
     assert any(key.startswith("airlight:version:") for key in read.attributes)
+    assert (read.attributes["airlight:commit"], read.attributes["airlight:digest"]) == (build().commit, build().digest)
     with Picture.open(frame.save(tmp_path / "frame.png")) as shown:
         assert shown.size == (6, 4)
     with pytest.raises(InputError, match=r"\.exr .* or \.png"):

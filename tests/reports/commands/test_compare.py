@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import airlight
+from airlight.reference.storage.build import build
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.reports.commands.main import run
 from airlight.validation.estimates.quadrature import reference_image
@@ -124,6 +125,7 @@ def test_a_difference_is_written_as_values_and_as_a_picture(files, tmp_path, cap
     assert printed(capsys, *images, "-o", str(values), "--mask", mask)["difference"] == str(values)
     reference, test = (read_exr(path).layers["airlight"].astype(float) for path in images)
     layers = read_exr(values).layers
+    assert read_exr(values).attributes["airlight:commit"] == build().commit
     np.testing.assert_allclose(layers["total"][2:], (test - reference)[2:], atol=1e-6)
     mean = reference[2:].mean()
     relative = (test - reference) / np.maximum(reference, 1e-3 * mean)

@@ -218,6 +218,17 @@ def test_one_run_is_not_compared_with_itself_and_a_change_of_the_machine_is_name
     assert {(note.scene, note.old, note.new) for note in changed} == {("hall", 1.1, 1.9)}
 
 
+@pytest.mark.claim("build-named")
+def test_reports_of_two_commits_of_one_version_say_so():
+    old, new = report(), report()
+    old["environment"]["build"] = {"airlight": "0.9", "commit": "1a2b3c", "changed": False, "digest": "ab"}
+    new["environment"]["build"] = old["environment"]["build"] | {"changed": True, "digest": "cd"}
+    said = "airlight: 0.9, commit 1a2b3c, files ab -> 0.9, commit 1a2b3c with changes, files cd"
+    assert said in words(compare_reports(old, new), "note")
+    new["environment"]["build"] = dict(old["environment"]["build"])
+    assert not [note for note in words(compare_reports(old, new), "note") if note.startswith("airlight")]
+
+
 def claimed(verdict, measured, *, unit="", published=None, item="eq. 1"):
     """Return a report with one verdict on a paper."""
     row = {"paper": "biri", "item": item, "words": "words", "verdict": verdict, "published": published}

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from airlight.reference.storage import build as identity
 from airlight.reports.commands import main as cli
 from airlight.reports.commands import start
 from airlight.reports.commands import test as command
@@ -80,18 +81,14 @@ def test_help_is_that_of_the_command_and_what_is_behind_two_dashes_is_pytests(ca
 
 
 @pytest.mark.parametrize(
-    ("status", "git", "commit"),
-    [(0, "1a2b3c4\n", "1a2b3c4"), (1, "", "unknown"), (1, None, "unknown")],
-    ids=["of a commit", "without history", "without git"],
+    ("status", "commit", "changed"),
+    [(0, "1a2b3c4", False), (1, "1a2b3c4", True), (1, "unknown", None)],
+    ids=["of a commit", "of changed files", "without git"],
 )
 def test_a_run_of_all_tiers_is_recorded_with_its_commit_and_counts(
-    monkeypatch, tmp_path, capsys, clock, status, git, commit
+    monkeypatch, tmp_path, capsys, clock, status, commit, changed
 ):
     def run(words, **how):
-        if words[0] == "git":
-            if git is None:
-                raise FileNotFoundError(2, "No such file or directory", "git")
-            return SimpleNamespace(stdout=git)
         assert words[: len(PYTEST + SHARED)] == PYTEST + SHARED
         assert "--allowed-skips=.ci/skips" in words
         (results,) = (word.removeprefix("--junit-xml=") for word in words if word.startswith("--junit-xml="))
@@ -100,12 +97,14 @@ def test_a_run_of_all_tiers_is_recorded_with_its_commit_and_counts(
         return SimpleNamespace(returncode=status)
 
     monkeypatch.setattr(command, "subprocess", SimpleNamespace(run=run))
+    monkeypatch.setattr(identity, "build", lambda: identity.Build("0.9", commit, changed, "ab"))
     monkeypatch.setattr(command, "RECORD", str(tmp_path / "record.json"))
     monkeypatch.setenv(VARIABLE, "quick")
     assert cli.run(["test", "--all"]) == status
     record = json.loads((tmp_path / "record.json").read_text())
-    assert {name: record[name] for name in ("commit", "passed", "failed", "skipped")} == {
+    assert {name: record[name] for name in ("commit", "changed", "passed", "failed", "skipped")} == {
         "commit": commit,
+        "changed": changed,
         "passed": 3,
         "failed": 3,
         "skipped": 3,

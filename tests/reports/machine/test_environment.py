@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airlight.reference.storage.build import build
 from airlight.reference.storage.cache import store_arrays
 from airlight.reports.commands.main import run
 from airlight.reports.machine import doctor, environment, gpu, llvm
@@ -175,6 +176,14 @@ def filled(own_cache):
         for number in range(2):
             store_arrays(f"{kind}-{number:032x}", {"a": np.zeros(2000)})
     return own_cache
+
+
+@pytest.mark.claim("build-named")
+def test_doctor_names_the_commit_and_the_digest(monkeypatch):
+    monkeypatch.setattr(doctor, "prepare", lambda: environment.Prepared("llvm_ad_rgb", None))
+    monkeypatch.setattr(doctor, "try_kernel", lambda variant: doctor.Kernel(variant, 2, None, 8.94e-4))
+    (check,) = (check for check in doctor.diagnose().checks if check.what == "airlight")
+    assert (check.works, check.details) == (True, build().words)
 
 
 def test_the_cache_is_shown_and_cleared(filled, monkeypatch):

@@ -76,6 +76,17 @@ def test_page_shows_the_numbers_of_the_data(data, folder):
     assert render(data, folder).source == render(report_data(), folder).source
 
 
+@pytest.mark.claim("build-named")
+def test_page_names_the_commit_and_the_digest_where_the_report_has_them(data, folder):
+    assert "airlight 0.1.0, effort" in render(data, folder).text
+    made = {"airlight": "0.9", "commit": "1a2b3c4d5e6f7a8b", "changed": True, "digest": "0f1e2d3c4b5a6978"}
+    text = render(data | {"environment": data["environment"] | {"build": made}}, folder).text
+    words = "airlight 0.9, commit 1a2b3c4d5e6f with changes, files 0f1e2d3c4b5a"
+    assert f"{words}, effort" in text
+    assert f"Written by {words}." in text
+    assert "digest 0f1e2d3c4b5a6978" in text
+
+
 @pytest.mark.claim("report-stands-alone")
 def test_page_needs_nothing_but_itself(data, folder):
     """Only the pictures that are named for readers without scripts are other files, and they are not loaded.
