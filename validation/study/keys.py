@@ -74,8 +74,7 @@ class RowInputs(Inputs):
     chosen: Configuration
     code: tuple[Content, ...]  #: of the user's in the configuration
     measure: Measure
-    airlight: str  #: version
-    source: str  #: see `row_source`
+    source: str  #: see `row_source`; a version says nothing that it does not
     packages: tuple[tuple[str, str], ...]
     variant: str  #: Mitsuba's
 
@@ -87,7 +86,7 @@ def cell_key(cell: Cell, made: Made, scenes: Mapping[str, str] | None = None) ->
     """
     chosen = replace(cell.chosen, parameters=tuple(sorted(cell.chosen.parameters)))
     reference = CellReference((scenes or {}).get(cell.scene) or scene_identity(cell.scene), cell.size, cell.medium)
-    versions = made.airlight, made.source, made.packages, made.variant
+    versions = made.source, made.packages, made.variant
     inputs = RowInputs(reference, chosen, user_code(cell.chosen), cell.measure, *versions)
     return inputs.key or f"row-{uuid.uuid4().hex}"
 
