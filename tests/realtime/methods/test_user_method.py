@@ -228,6 +228,7 @@ def test_loading_leaves_nothing_beside_the_file(tmp_path, monkeypatch):
     assert not sys.dont_write_bytecode
 
 
+@pytest.mark.claim("own-method-frozen")
 def test_only_a_method_that_says_so_is_frozen(own, variant):
     scene = read_scene(mi.load_dict(tiny_scene()))
     assert not isinstance(frame_renderer(scene, find_method(f"{own}:constant")).stages.render, Frozen)
