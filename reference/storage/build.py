@@ -9,13 +9,11 @@ A checkout asks git, once in a process and not before somebody wants to know. A 
 distributions, with the digest of the files then. A file that was changed afterwards is noticed by that digest.
 
 The digest is of bytes, comments too, unlike those of `code.py`, which decide what is computed again: it takes a
-hundredth of a second in place of two, and is the same for every version of Python. Nothing of ours is imported at the
-top: `setup.py` runs this file where no package is installed.
+twentieth of a second in place of two, and is the same for every version of Python. Nothing of ours is imported at the
+top, as `setup.py` runs this file where no package is installed, and nothing that `airlight --help` would wait for.
 """
 
-import hashlib
 import os
-import subprocess
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -68,6 +66,8 @@ def commit_line(package: Path) -> str:
 
 def package_digest(package: Path) -> str:
     """Return a digest of the files of the package, the same in a checkout and installed, on every system."""
+    import hashlib
+
     paths = [
         Path(folder, name)
         for folder, _, names in os.walk(package, followlinks=True)
@@ -93,6 +93,8 @@ def _written(package: Path) -> list[str]:
 
 def _asked(package: Path) -> tuple[str, bool] | None:
     """Ask git for the commit of a checkout, and whether files of the package differ; None where there is no answer."""
+    import subprocess
+
     root = package.parents[1].resolve()
     if not (root / ".git").exists():  # a file in worktrees; the repository around an installed copy is not ours
         return None
