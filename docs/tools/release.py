@@ -35,7 +35,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 STAMP, CHANGELOG, CITATION = "src/airlight/__init__.py", "CHANGELOG.md", "CITATION.cff"
 RECORD = "docs/data/full_run.json"
-#: What all tests are a test of: where it changes, they must run again. Pages and their data are none of it.
+#: The files that all tests are a test of: where one changes, they must run again. Pages and their data are none of it.
 CODE = (
     *("analytic", "realtime", "reference", "validation", "reports", "src", "tests"),
     *("airlight", "setup.py", "pyproject.toml", ":(glob)*.lock"),
@@ -49,10 +49,10 @@ _UNRELEASED = "## [Unreleased]\n"
 
 
 class RefusedError(Exception):
-    """What stands in the way, a sentence a line."""
+    """The reasons why there is no release, a sentence a line."""
 
 
-# What is asked of a checkout ------------------------------------------------------------------------------------------
+# Questions to a checkout ----------------------------------------------------------------------------------------------
 
 
 def git(root: Path, *words: str) -> str:

@@ -205,7 +205,7 @@ def test_a_release_is_a_commit_with_a_tag_and_files_of_nothing_else(ready, tmp_p
     assert list(tool.stamp_problems(ready)) == []
     assert 'version: 0.9.0\ndate-released: "' in (ready / tool.CITATION).read_text()
     git(ready, "checkout", "--quiet", "main")
-    # What follows has the next stamp, and cites what was released.
+    # The next commit has the next stamp, and cites what was released.
     assert tool.stamped_number(ready) == ("0.9.1", True)
     assert list(tool.stamp_problems(ready)) == []
     assert "nothing to release" in said(ready)
