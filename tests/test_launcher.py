@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Claim: the launcher `./airlight` makes its environment once, repairs a broken one, and says what to type.
 
-A Python, a pip and an apt-get that only say what they were asked stand for the machine's. The real installation takes a
-minute and a network; it happens wherever `./airlight test` runs on a fresh clone.
+A Python and an apt-get that only say what they were asked stand for the machine's. `reports/machine/test_install.py`
+tests what installs the packages. The real installation needs a network; it happens wherever `./airlight test` runs on a
+fresh clone.
 """
 
 import os
@@ -13,7 +14,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-LOCKS = ("requirements.lock", "requirements-sweep.lock", "requirements-test.lock")
 
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="the launcher is a script for POSIX shells"),
@@ -21,23 +21,18 @@ pytestmark = [
 ]
 
 # Stands for every Python of the machine and, through a symbolic link, of the environment. It logs what it is asked
-# and fails on request: a file `no-ensurepip` or `pip-fails` beside it says which.
+# and fails on request: a file `no-ensurepip` or `install-fails` beside it says which.
 _PYTHON = """#!/bin/sh
 here=$(dirname "$(readlink -f "$0")")
 case "$*" in
     *"print("*) echo 3.11 ;;
     *"import ensurepip"*) [ ! -e "$here/no-ensurepip" ] ;;
-    "-m venv "*) echo venv >>"$here/log"; mkdir -p "$3/bin" && ln -s "$(readlink -f "$0")" "$3/bin/python" &&
-        ln -s "$here/uv" "$3/bin/uv" ;;
-    "-m pip "*) echo pip >>"$here/log"; [ ! -e "$here/pip-fails" ] ;;
+    "-m venv "*) echo venv >>"$here/log"; mkdir -p "$3/bin" && ln -s "$(readlink -f "$0")" "$3/bin/python" ;;
+    "-I "*install.py*) shift 2; echo install "$@" >>"$here/log"; [ ! -e "$here/install-fails" ] ;;
     *"-m airlight.reports.machine.doctor") cat "$here/missing" 2>/dev/null || echo ;;
     -c*) true ;;
-    *) printf 'ran'; for word; do printf ' <%s>' "$word"; done; echo ;;
+    *) printf 'ran'; for word; do printf ' <%s>' "$word"; done; echo " with$AIRLIGHT_EXTRAS" ;;
 esac
-"""
-_UV = """#!/bin/sh
-here=$(dirname "$(readlink -f "$0")")
-echo uv >>"$here/log"; [ ! -e "$here/uv-fails" ]
 """
 _APT = """#!/bin/sh
 echo "apt-get $*" >>"$(dirname "$0")/log"
@@ -51,11 +46,10 @@ def machine(tmp_path):
     project.mkdir()
     programs.mkdir()
     shutil.copy(ROOT / "airlight", project)
-    for name in (*LOCKS, "pyproject.toml"):
+    for name in ("uv.lock", "pyproject.toml"):
         (project / name).write_text(f"{name}\n")
     _program(programs / "python3.11", _PYTHON)
-    _program(programs / "uv", _UV)
-    for name in ["sh", "cksum", "dirname", "basename", "readlink", "mkdir", "ln", "rm", "cat", "sed", "tee", "flock"]:
+    for name in ["sh", "cksum", "dirname", "basename", "readlink", "mkdir", "ln", "rm", "cat", "flock"]:
         if found := shutil.which(name):
             (programs / name).symlink_to(found)
     _program(programs / "id", "#!/bin/sh\necho 1000\n")
@@ -83,70 +77,60 @@ def _log(machine: Path) -> list[str]:
 
 def test_the_first_start_installs_and_later_starts_do_not(machine):
     first = _start(machine, "report", "--scenes", "a b,c", "*")
-    assert (first.returncode, first.stdout) == (0, "ran <-P> <-m> <airlight> <report> <--scenes> <a b,c> <*>\n")
-    assert _log(machine) == ["venv", "pip", "uv", "uv"]
+    assert (first.returncode, first.stdout) == (0, "ran <-P> <-m> <airlight> <report> <--scenes> <a b,c> <*> with\n")
+    assert _log(machine) == ["venv", "install"]
     assert first.stderr.count("\n") == 1
     (machine / "link").symlink_to(machine / "a project" / "airlight")
     second = _start(machine, "--version", launcher=machine / "link")
-    assert (second.returncode, second.stdout, second.stderr) == (0, "ran <-P> <-m> <airlight> <--version>\n", "")
+    assert (second.returncode, second.stdout, second.stderr) == (0, "ran <-P> <-m> <airlight> <--version> with\n", "")
     assert _log(machine) == []
 
 
-def test_new_versions_are_installed_on_top(machine):
-    _start(machine)
+def test_new_versions_are_installed_on_top_with_all_extras_that_were_added(machine):
+    _start(machine, AIRLIGHT_EXTRAS="sweep")
     _log(machine)
-    (machine / "a project" / "requirements.lock").write_text("other\n")
-    assert "updating" in _start(machine).stderr
-    assert _log(machine) == ["uv", "uv"]
+    (machine / "a project" / "uv.lock").write_text("other\n")
+    assert "adding packages to .venv: new versions" in _start(machine).stderr
+    assert _log(machine) == ["install sweep"]
+    assert _start(machine).stderr == ""
 
 
-def test_pip_installs_where_uv_cannot(machine):
-    (machine / "programs" / "uv-fails").touch()
-    assert _start(machine).returncode == 0
-    assert _log(machine) == ["venv", "pip", "uv", "pip", "uv", "pip"]
-
-
-@pytest.mark.parametrize("command", ["sweep", "test"])
-def test_the_packages_of_a_command_wait_for_its_first_start(machine, command):
+def test_an_extra_is_added_once_to_what_is_there(machine):
+    """The command that needs it starts the launcher again, and is told what was added: it does not ask twice."""
     _start(machine, "list")
-    assert _log(machine) == ["venv", "pip", "uv", "uv"]
-    assert "updating" in _start(machine, command, "-q").stderr
-    assert _log(machine) == ["uv", "uv"]
-    assert _start(machine, command).stderr == _start(machine, "list").stderr == ""
-    assert _log(machine) == []
-    (machine / "a project" / f"requirements-{command}.lock").write_text("other\n")
-    _start(machine, command)
-    assert _log(machine) == ["uv", "uv"]
-
-
-def test_commands_by_turns_install_their_packages_once(machine):
-    for command in ("list", "sweep", "test"):
-        _start(machine, command)
-    _log(machine)
+    assert _log(machine) == ["venv", "install"]
+    added = _start(machine, "sweep", "x.toml", AIRLIGHT_EXTRAS="sweep")
+    assert added.stderr == "airlight: adding packages to .venv: sweep\n"
+    assert added.stdout.endswith("<sweep> <x.toml> withsweep\n")
+    assert _log(machine) == ["install sweep"]
+    assert _start(machine, "sweep", "x.toml").stderr == _start(machine, "list").stderr == ""
+    assert _start(machine, "test", AIRLIGHT_EXTRAS="test").returncode == 0
+    assert _log(machine) == ["install sweep test"]  # removes nothing
     for command in ("sweep", "test", "list", "sweep"):
         assert _start(machine, command).stderr == ""
     assert _log(machine) == []
 
 
-@pytest.mark.parametrize("line", [["sweep", "--help"], ["test", "-h"]])
-def test_help_installs_no_packages_of_a_command(machine, line):
-    _start(machine, "list")
+def test_an_extra_that_could_not_be_added_is_not_taken_for_there(machine):
+    _start(machine)
+    (machine / "programs" / "install-fails").touch()
+    assert _start(machine, AIRLIGHT_EXTRAS="sweep").returncode == 3
+    (machine / "programs" / "install-fails").unlink()
     _log(machine)
-    assert _start(machine, *line).stderr == ""
-    assert _log(machine) == []
+    (machine / "a project" / "uv.lock").write_text("other\n")
+    _start(machine)
+    assert _log(machine) == ["install"]
 
 
 def test_an_interrupted_first_start_is_repaired(machine):
-    (machine / "programs" / "pip-fails").touch()
-    (machine / "programs" / "uv-fails").touch()
+    (machine / "programs" / "install-fails").touch()
     failed = _start(machine)
     assert (failed.returncode, failed.stdout) == (3, "")
     assert "start again" in failed.stderr
-    (machine / "programs" / "pip-fails").unlink()
-    (machine / "programs" / "uv-fails").unlink()
+    (machine / "programs" / "install-fails").unlink()
     _log(machine)
     assert _start(machine).returncode == 0
-    assert _log(machine) == ["venv", "pip", "uv", "uv"]
+    assert _log(machine) == ["venv", "install"]
 
 
 def test_starts_at_the_same_time_install_once(machine):
@@ -157,8 +141,8 @@ def test_starts_at_the_same_time_install_once(machine):
     environment = {"PATH": str(machine / "programs")}
     started = [subprocess.Popen([launcher, str(n)], env=environment, **pipes) for n in range(3)]
     answers = [process.communicate()[0] for process in started]
-    assert [answer.split()[-1] for answer in answers] == ["<0>", "<1>", "<2>"]
-    assert _log(machine) == ["venv", "pip", "uv", "uv"]
+    assert [answer.split()[-2] for answer in answers] == ["<0>", "<1>", "<2>"]
+    assert _log(machine) == ["venv", "install"]
 
 
 def test_a_copied_folder_and_a_python_that_has_gone_are_rebuilt(machine):
@@ -205,5 +189,5 @@ def test_libraries_are_installed_for_root_and_named_for_others(machine):
     shutil.rmtree(machine / "a project" / ".venv")
     _program(machine / "programs" / "id", "#!/bin/sh\necho 0\n")
     assert _start(machine, "report").returncode == 0
-    (asked,) = [line for line in _log(machine) if "install" in line]
+    (asked,) = [line for line in _log(machine) if line.startswith("apt-get -y")]
     assert asked.endswith("libllvm19 libatomic1")

@@ -10,12 +10,12 @@ import subprocess
 import sys
 import tomllib
 import zipfile
-from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
-from packaging.utils import canonicalize_name
+
+from airlight.reports.machine.install import requirements
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("analytic", "realtime", "reference", "validation", "reports")
@@ -27,35 +27,40 @@ def _python(code: str, cwd: Path = ROOT) -> str:
     return ran.stdout
 
 
+def _uv(*words: str) -> str:
+    uv = Path(sys.prefix) / "bin" / "uv"
+    if not uv.exists():
+        pytest.skip("uv cannot be had here")
+    command = [uv, *words, "--no-config", "--offline", "--project", ROOT]
+    ran = subprocess.run(command, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout
+
+
 @pytest.mark.claim("locked-dependencies")
-def test_the_lock_pins_what_the_project_asks_for_and_all_that_it_needs():
-    lines = (ROOT / "requirements-test.lock").read_text().splitlines()
-    pinned = [line for line in lines if not line.startswith(" ")]
-    assert sum("==" in line for line in lines) == len(pinned) <= sum("--hash=sha256:" in line for line in lines)
-    for lock in ("requirements.lock", "requirements-sweep.lock"):
-        assert set((ROOT / lock).read_text().splitlines()) < set(lines), f"{lock} has other versions"
-    pinned = [Requirement(line.removesuffix(" \\")) for line in pinned]
-    here = [wanted for wanted in pinned if wanted.marker is None or wanted.marker.evaluate()]
-    locked = {canonicalize_name(wanted.name): str(wanted.specifier).removeprefix("==") for wanted in here}
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    project, groups = declared["project"], declared["dependency-groups"]
-    extras = [text for extra in (project["optional-dependencies"] | groups).values() for text in extra]
-    waiting = [Requirement(text) for text in project["dependencies"] + extras]
-    checked = set()
-    while waiting:
-        wanted = waiting.pop()
-        name = canonicalize_name(wanted.name)
-        assert name in locked, f"{wanted} is not locked"
-        assert wanted.specifier.contains(locked[name], prereleases=True), f"{wanted}, locked is {locked[name]}"
-        if name in checked:
-            continue
-        checked.add(name)
-        try:
-            needs = [Requirement(text) for text in requires(wanted.name) or []]
-        except PackageNotFoundError:
-            pytest.skip(f"{wanted.name} is not installed here, so what it needs is unknown")
-        waiting += [need for need in needs if need.marker is None or need.marker.evaluate({"extra": ""})]
-    assert checked == set(locked), "a lock holds what nothing needs"
+def test_the_lock_pins_what_the_project_declares_with_files_of_the_public_index():
+    _uv("lock", "--check")
+    packages = tomllib.loads((ROOT / "uv.lock").read_text())["package"]
+    files = [file for each in packages for file in (*each.get("wheels", ()), *filter(None, [each.get("sdist")]))]
+    assert {each["source"].get("registry") for each in packages} == {None, "https://pypi.org/simple"}
+    assert all(file["url"].startswith("https://files.pythonhosted.org/") and file["hash"] for file in files)
+
+
+@pytest.mark.claim("locked-dependencies")
+@pytest.mark.parametrize("extras", [(), ("sweep",), ("view", "shaders"), ("test",)], ids=" ".join)
+def test_the_launcher_installs_what_the_lock_says_and_nothing_else(extras):
+    words = [word for extra in extras for word in ("--extra", extra)]
+    plain = ["--frozen", "--no-emit-project", "--no-header", "--no-annotate", "--group", "launcher"]
+    expected = set()
+    for line in _uv("export", *plain, *words).replace("\\\n", "").splitlines():
+        package, *checksums = line.split("--hash=")
+        wanted = Requirement(package)
+        if wanted.marker is None or wanted.marker.evaluate():
+            expected.add((wanted.name, str(wanted.specifier), frozenset(each.strip() for each in checksums)))
+    found = [line.split(" --hash=") for line in requirements(extras)]
+    assert {(*each.partition("==")[::2], frozenset(files)) for each, *files in found} == {
+        (name, version.removeprefix("=="), files) for name, version, files in expected
+    }
 
 
 def test_importing_everything_sets_no_variant_and_fails_nowhere():

@@ -40,6 +40,7 @@ from airlight.reports.machine.environment import (
     install_line,
     missing_packages,
 )
+from airlight.reports.machine.process_start import start_again_with
 from airlight.reports.studies.registry import ENDINGS as STUDY_ENDINGS
 from airlight.reports.studies.registry import STUDIES, find_study
 from airlight.reports.studies.registry import study as run_study
@@ -235,8 +236,10 @@ def find_command(words: Sequence[str]) -> App:
     return app
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
     """Run the command line and return the exit status.
+
+    `extras` has the names of those that the launcher added for this command; None where it did not start this process.
 
     The user's mistakes, missing libraries and unusable files give one line on the error stream; any other exception
     is a fault of the program and keeps its traceback.
@@ -258,6 +261,8 @@ def run(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return 130
     except MissingError as error:
+        if error.extra and extras is not None and error.extra not in extras.split():
+            start_again_with(" ".join([*extras.split(), error.extra]))
         return _fail(str(error), MISSING)
     except OSError as error:
         if error.filename is None and error.errno not in (errno.ENOSPC, errno.EDQUOT):

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The start of the `airlight` command: signals and streams before all that takes time."""
 
+import os
 import sys
 
-from airlight.reports.machine.process_start import default_signals, usable_streams
+from airlight.reports.machine.process_start import EXTRAS, default_signals, usable_streams
 
 
 def main() -> None:
@@ -12,4 +13,4 @@ def main() -> None:
     usable_streams()
     from airlight.reports.commands.main import run
 
-    sys.exit(run(sys.argv[1:]))
+    sys.exit(run(sys.argv[1:], extras=os.environ.pop(EXTRAS, None)))

@@ -32,13 +32,14 @@ def run_tests(*arguments: str, all_: bool = False) -> int:
         Also the slow and the statistical tests, injected faults and baselines.
     """
     from airlight.reports.machine import quick_compilation
-    from airlight.reports.machine.environment import MissingError, prepare
+    from airlight.reports.machine.environment import MissingError, prepare, require
 
     root = Path(__file__).resolve().parents[2]
     if not (root / "tests").is_dir():
         raise MissingError(
             f"there are no tests in {root}, they come with the source only: clone it and run `./airlight test` there"
         )
+    require("pytest", "test", "a test")
     variant = prepare().variant
     workers = _workers()
     sharing = ["-n", str(workers), "--dist", "worksteal"] if workers > 1 else []

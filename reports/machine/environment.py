@@ -5,7 +5,7 @@ Importing this module imports neither Mitsuba nor Dr.Jit. `activate` is the only
 """
 
 import ctypes
-import importlib
+import importlib.util
 import os
 import sys
 from collections.abc import Mapping
@@ -36,6 +36,8 @@ class MissingError(RuntimeError):
     The message is one line that says what is missing and what to type. The command line prints it without a
     traceback and exits with status 3.
     """
+
+    extra: str | None = None  #: whose packages are missing, where it is these
 
 
 #: Threads of Dr.Jit. With one, Mitsuba 3.9.1 never ends reading or writing an EXR file: its tasks wait for a thread
@@ -121,13 +123,12 @@ def activate(variant: str | None = None) -> str:
 
 def require(package: str, extra: str, what: str) -> None:
     """Raise MissingError where a package of an extra is not installed, before any work."""
-    try:
-        importlib.import_module(package)
-    except ImportError:
-        raise MissingError(
-            f"{what} needs the package {package}: `./airlight {extra}` brings it in a clone, "
-            f"`pip install {package}` elsewhere"
-        ) from None
+    if importlib.util.find_spec(package) is None:
+        error = MissingError(
+            f"{what} needs the package {package}: `./airlight` brings it in a clone, `pip install {package}` elsewhere"
+        )
+        error.extra = extra
+        raise error
 
 
 def child_environment(variant: str | None = None) -> dict[str, str]:

@@ -5,7 +5,7 @@ from functools import cache
 
 from airlight.realtime.errors import NoDriverError
 from airlight.realtime.methods.shader.client import ShaderHost
-from airlight.reports.machine.environment import MissingError
+from airlight.reports.machine.environment import MissingError, require
 from airlight.reports.machine.gpu import Status
 
 _DEBIAN = "apt-get install -y libegl1 libgl1 libgl1-mesa-dri"
@@ -39,6 +39,7 @@ def opengl_status(*, judged: bool = True) -> Status:
 @cache
 def require_opengl() -> str:
     """Return the device that draws shaders, with its error; raise MissingError if none does, or if it is wrong."""
+    require("moderngl", "shaders", "a shader")
     status = opengl_status()
     if not status.works:
         raise MissingError(status.reason)

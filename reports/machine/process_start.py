@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a process of ours begins: signals end it at once, by the system's default; its streams can be written.
+"""How a process of ours begins: signals end it at once, by the system's default; its streams can be written; the
+launcher adds what it lacks.
 
 Python's own way, a KeyboardInterrupt in the middle of whatever runs, waits for a kernel to end and shows a traceback.
 Nothing is lost by an end at any moment: files are written whole or not at all, results are kept as they come.
@@ -9,6 +10,9 @@ import io
 import os
 import signal
 import sys
+from pathlib import Path
+
+EXTRAS = "AIRLIGHT_EXTRAS"  #: the variable by which the launcher is told what to add, and tells what it added
 
 
 def default_signals() -> None:
@@ -36,3 +40,11 @@ def usable_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def start_again_with(extras: str) -> None:
+    """Let the launcher, where there is one, take the place of this process, add extras, and run the same command."""
+    launcher = Path(__file__).resolve().parents[2] / "airlight"
+    if launcher.is_file():
+        sys.stdout.flush()
+        os.execve(launcher, [str(launcher), *sys.argv[1:]], os.environ | {EXTRAS: extras})

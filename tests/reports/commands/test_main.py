@@ -5,6 +5,7 @@ import json
 import os
 import re
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -13,8 +14,10 @@ from airlight.analytic.errors import InputError
 from airlight.realtime.errors import InputError as RealtimeInputError
 from airlight.reports.commands import main as cli
 from airlight.reports.machine.environment import MissingError
+from airlight.reports.machine.process_start import EXTRAS
 from airlight.reports.studies.registry import STUDIES
 
+ROOT = Path(__file__).resolve().parents[3]
 _COMMANDS = [["study"], *(["study", name] for name in STUDIES)]
 _COMMANDS += [[cli._NAMES.get(each, each.__name__)] for several in cli._PANELS.values() for each in several]
 
@@ -82,6 +85,32 @@ def test_a_system_library_that_is_missing_is_named_with_how_to_install_it(
 
 
 @pytest.mark.claim("exit-status")
+@pytest.mark.claim("extras-when-needed")
+def test_a_command_that_lacks_an_extra_has_the_launcher_add_it_once(command_that_raises, monkeypatch, capsys):
+    started = []
+    monkeypatch.setattr(os, "execve", lambda path, words, world: started.append((path, words[1:], world[EXTRAS])))
+    monkeypatch.setattr(sys, "argv", ["airlight", "list"])
+    error = MissingError("no pyarrow")
+    error.extra = "sweep"
+    command_that_raises(error)
+    assert cli.run(["list"]) == 3  # from Python or a wheel, without the launcher
+    assert cli.run(["list"], extras="test sweep") == 3  # it has added it, and could not
+    assert not started
+    assert capsys.readouterr().err == 2 * "airlight: error: no pyarrow\n"
+    cli.run(["list"], extras="test")
+    assert started == [(ROOT / "airlight", ["list"], "test sweep")]
+
+
+@pytest.mark.claim("extras-when-needed")
+@pytest.mark.parametrize(
+    ("words", "package"), [("view", "websockets"), ("sweep", "pyarrow"), ("test", "pytest"), ("render", "moderngl")]
+)
+def test_help_asks_for_no_extra(words, package, monkeypatch, capfd):
+    monkeypatch.setattr(os, "execve", lambda *given: pytest.fail(f"it starts again: {given}"))
+    monkeypatch.setitem(sys.modules, package, None)
+    assert cli.run([words, "--help"], extras="") == 0
+
+
 def test_ctrl_c_ends_with_the_status_of_a_shell(command_that_raises, capsys):
     command_that_raises(KeyboardInterrupt())
     assert cli.run(["list"]) == 130

@@ -31,7 +31,7 @@ def test_without_the_extra_one_line_says_what_to_type(monkeypatch, capfd):
     said = capfd.readouterr()
     assert said.err == (
         "airlight: error: the live view needs the package websockets: "
-        "`./airlight view` brings it in a clone, `pip install websockets` elsewhere\n"
+        "`./airlight` brings it in a clone, `pip install websockets` elsewhere\n"
     )
 
 
