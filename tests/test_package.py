@@ -31,7 +31,7 @@ def _uv(*words: str) -> str:
     uv = Path(sys.prefix) / "bin" / "uv"
     if not uv.exists():
         pytest.skip("uv cannot be had here")
-    command = [uv, *words, "--no-config", "--offline", "--project", ROOT]
+    command = [uv, *words, "--offline", "--project", ROOT]
     ran = subprocess.run(command, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
     return ran.stdout
