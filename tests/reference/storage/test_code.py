@@ -80,7 +80,9 @@ def test_code_is_the_same_wherever_it_lies_and_in_every_process(folder, tmp_path
     for path in folder.rglob("*.py"):
         (other / path.relative_to(folder)).parent.mkdir(exist_ok=True)
         (other / path.relative_to(folder)).write_text(path.read_text())
-    code = "import sys\nfrom pathlib import Path\nfrom reference.storage.code import code_digest, source_digest\n"
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom airlight.reference.storage.code import code_digest, source_digest\n"
+    )
     code += "print(code_digest([Path(sys.argv[1])]), source_digest('airlight.reference.storage.store'))"
     command = [sys.executable, "-c", code, str(other / "mine.py")]
     ran = subprocess.run(

@@ -182,7 +182,7 @@ def every_inputs(tmp_path) -> list[Inputs]:
         *(kind(*BATCHES) for kind in (SingleScatterInputs, VolpathInputs, CloudPathInputs)),
         RayInputs(rays),
         DriverInputs("llvmpipe"),
-        RowInputs(reference, CHOSEN, code, CELL.measure, "1.0", "ab", (("mitsuba", "3.9.1"),), "llvm_ad_rgb"),
+        RowInputs(reference, CHOSEN, code, CELL.measure, "ab", (("mitsuba", "3.9.1"),), "llvm_ad_rgb"),
         CheckInputs(Content("a"), Checks(patience=1.0), 16),
         MultipleInputs(Content("a"), 8, 4),
         CellInputs(REFERENCE, CELL, code, MACHINE),

@@ -8,8 +8,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import airlight.reference.quadrature.light_airlight as light_airlight
-import airlight.reference.quadrature.ray_values as quadrature
+from airlight.reference.quadrature import light_airlight
+from airlight.reference.quadrature import ray_values as quadrature
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import ReferenceLight, read_reference
 from airlight.reference.scene.shapes import Disks, Shapes

@@ -200,7 +200,7 @@ def test_a_run_that_is_killed_loses_nothing(variant, tmp_path, capfd, own_cache)
     """The real tracer in a process, killed when the cache has three of its batches."""
     (tmp_path / "a.exr").write_text("an older file")
     command = ["reference", *SCENE, "--estimator", "volpath", "-o", str(tmp_path / "a.exr"), "--samples", "400000"]
-    code = f"import sys\nfrom reports.commands.main import run\nsys.exit(run({command!r}))"
+    code = f"import sys\nfrom airlight.reports.commands.main import run\nsys.exit(run({command!r}))"
     process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, cwd=ROOT)
     while len(list(own_cache.glob("volpath-*/0*.npz"))) < 3 and process.poll() is None:
         time.sleep(0.05)
