@@ -15,7 +15,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
-HEAD = "import functools, sys, time\nfrom airlight.reports.machine.process_start import default_signals\ndefault_signals()\n"
+HEAD = "import functools, sys, time\nfrom airlight.reports.machine.process_start import default_signals\n"
+HEAD += "default_signals()\n"
 READY = "print('ready', flush=True)\n"
 KERNEL = """
 from airlight.reports.machine.environment import activate
