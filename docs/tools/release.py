@@ -301,21 +301,8 @@ def _certified(tree: Path, path: Path, date: datetime) -> None:
 
 def _site(tree: Path, pages: Path, path: Path, date: datetime) -> None:
     """Build the documentation, and pack it."""
-    _run(
-        tree,
-        "the site",
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-b",
-        "html",
-        "-d",
-        f"{pages}-trees",
-        "docs",
-        str(pages),
-    )
+    options = ["-W", "--keep-going", "-q", "-b", "html"]
+    _run(tree, "the site", "-m", "sphinx", *options, "-d", f"{pages}-trees", "docs", str(pages))
     built = (each for each in pages.rglob("*") if each.is_file() and each.name != ".buildinfo")
     _pack(path, [(each, each.relative_to(pages).as_posix()) for each in built], date)
 

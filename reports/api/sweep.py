@@ -149,11 +149,11 @@ def _findings(source: Path, target: Path | None) -> Said:
 
 def _run(study: "Study", store: "RowStore", place: "Place", *, variant: str, progress: Any) -> SweepRun:
     """Compute what is missing, add it to the store, and return what came of it."""
-    from airlight.reference.storage.build import build
+    from airlight import __version__
     from airlight.reports.cluster.cells import cell_groups, row_without_numbers, timing_groups
     from airlight.validation.study.keys import made_here, scene_identities
 
-    made, scenes = made_here(build().airlight, variant), scene_identities(study.scenes)
+    made, scenes = made_here(__version__, variant), scene_identities(study.scenes)
     problems: list[Problem] = []
 
     def with_errors(outcome: Any) -> list[dict[str, Any]]:

@@ -155,8 +155,8 @@ def _quiet() -> None:
 
 def facts() -> Any:
     """Return the versions and source code of this process, `validation.study.keys.Made`."""
-    from airlight.reference.storage.build import build
+    from airlight import __version__
     from airlight.reports.machine.environment import activate
     from airlight.validation.study.keys import made_here
 
-    return made_here(build().airlight, activate())
+    return made_here(__version__, activate())

@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from airlight import __version__
 from airlight.reference.storage.build import build
 from airlight.reports.machine import quick_compilation
 from airlight.reports.machine.gpu import cuda_status, optix_status
@@ -214,7 +215,7 @@ def versions() -> dict[str, str]:
     """Return the versions of airlight, Python and the packages that make the numbers."""
     from importlib.metadata import PackageNotFoundError, version
 
-    installed = {"airlight": build().airlight, "python": ".".join(map(str, sys.version_info[:3]))}
+    installed = {"airlight": __version__, "python": ".".join(map(str, sys.version_info[:3]))}
     for package in _PACKAGES:
         try:
             installed[package] = version(package)
