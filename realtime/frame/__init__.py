@@ -7,7 +7,6 @@ Read in this order:
 - `renderer.py`: a frame as groups of lights times parts of the image, and how its stages follow one another.
 - `sphere_lights.py`: the airlight of samples on a sphere, scaled to that of the sphere.
 - `surface.py`: camera rays, and the light that surfaces send back through the medium.
-- `adaptive_sampling.py`: what is computed at the corners of tiles, and interpolated between them where that is enough.
 - `history.py`: the mean with the frames before, for any method.
 - `incremental.py`: the next frame of an animation, and the cache of what stood still.
 - `samples.py`: several rays of each pixel, for pictures.

@@ -31,7 +31,6 @@ import numpy as np
 
 from airlight.realtime.area_lights.points import LightSamples
 from airlight.realtime.errors import InputError
-from airlight.realtime.frame.adaptive_sampling import between_corners
 from airlight.realtime.frame.history import HistoryPass
 from airlight.realtime.frame.light_on_ray import check_radiance
 from airlight.realtime.frame.sphere_lights import sampled_sphere, sphere_scales
@@ -162,8 +161,6 @@ def frame_renderer(
     if chosen.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, expected one of realtime.kernels.registry.KERNELS")
     _check_clouds(scene, chosen)
-    if chosen.interpolated:
-        chosen = between_corners(chosen, scene)
     pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
     dr.eval(pixel)
     made = FrameRenderer(

@@ -67,7 +67,7 @@ from airlight.realtime.clouds.single_scattering import (
 )
 from airlight.realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from airlight.realtime.memory import check_memory
-from airlight.realtime.methods.interface.method import Layers, Method, View, tolerance
+from airlight.realtime.methods.interface.method import Layers, Method, View
 from airlight.realtime.numerics.array_types import types_of
 from airlight.realtime.numerics.recorded import Frozen
 from airlight.realtime.parameters import parameter
@@ -131,7 +131,6 @@ class CloudCollectors(Method):
         1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
     )
     map: int = map_size(256, "texels on a side of the maps of a sun")
-    tolerance: float = tolerance()
 
     @property
     def carries(self):
@@ -156,12 +155,7 @@ class CloudCollectors(Method):
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
-        return (
-            ("resolution", {"tolerance": 0.0}),
-            ("map", {"map": 2048}),
-            ("search", {"iterations": 40}),
-            ("slab", None),
-        )
+        return ("map", {"map": 2048}), ("search", {"iterations": 40}), ("slab", None)
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ import mitsuba as mi
 from airlight.realtime.errors import InputError
 from airlight.realtime.intervals import add_waiting, close_interval, no_intervals, sum_at_end
 from airlight.realtime.methods.interface.marching import marched_integral, marched_steps
-from airlight.realtime.methods.interface.method import Method, animate, jitter, tolerance
+from airlight.realtime.methods.interface.method import Method, animate, jitter
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.media.medium import LitRays
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, lit_in_map, map_size
@@ -77,13 +77,11 @@ class RayMarch(Method):
     jitter: str = jitter()
     animate: str = animate()
     map: int = map_size(512, "texels on a side of a face of the map, with `shadow=map`")
-    tolerance: float = tolerance()
 
     def _check_together(self) -> None:
-        if self.jitter != "none" and (self.sum == "transitions" or self.tolerance):
+        if self.jitter != "none" and self.sum == "transitions":
             raise InputError(
-                f"jitter: got {self.jitter} with sum={self.sum} and tolerance={self.tolerance:g}, expected "
-                "sum=steps and tolerance=0: a mean of runs is no integral, or neighbours are not alike"
+                f"jitter: got {self.jitter} with sum=transitions, expected sum=steps: a mean of runs is no integral"
             )
         if self.jitter == "none" and self.animate != "none":
             raise InputError(f"animate: got {self.animate} without jitter, expected jitter=white, blue or ign with it")
@@ -132,7 +130,7 @@ class RayMarch(Method):
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
         without = "shadows" if self.shadow == "none" else "map"
-        return ("resolution", {"tolerance": 0.0}), (without, {"shadow": "ray"}), ("steps", None)
+        return (without, {"shadow": "ray"}), ("steps", None)
 
 
 def _lit_runs(airlight: LitRays, distance, *, steps: int, spacing: str, lit) -> Any:

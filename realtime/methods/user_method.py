@@ -29,7 +29,7 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.realtime.errors import InputError, root_of
-from airlight.realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
+from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.parameters import values
 from airlight.realtime.scene.lights import sources_of
 
@@ -91,9 +91,6 @@ def _of_function(function: Any, name: str) -> type[Method]:
     takes_kernel, parameters = _signature(function, name)
     check_names(name, parameters, Method)
     items = [(key, type(default), field(default=default)) for key, default in parameters.items()]
-    by_rays = bool(getattr(function, "by_rays", False))
-    if by_rays:
-        items = [*(item for item in items if item[0] != "tolerance"), ("tolerance", float, tolerance())]
     prepare = getattr(function, "prepare", None)
     if prepare is not None and not callable(prepare):
         raise InputError(
@@ -117,8 +114,7 @@ def _of_function(function: Any, name: str) -> type[Method]:
         return run
 
     def render(self, view, state, kernel):
-        given = {key: value for key, value in values(self).items() if key in parameters}
-        given |= {"kernel": kernel} if takes_kernel else {}
+        given = values(self) | ({"kernel": kernel} if takes_kernel else {})
         with user_errors(f"method {name}", _file(function)):
             returned = function(replace(view, prepared=state), **given)
         return Layers(checked_radiance(returned, view, name))
@@ -130,14 +126,12 @@ def _of_function(function: Any, name: str) -> type[Method]:
         "uses_kernel": takes_kernel,
         "casts_rays": True,
         "frozen": bool(getattr(function, "frozen", False)),
-        "by_rays": by_rays,
+        "by_rays": bool(getattr(function, "by_rays", False)),
         "shadows": bool(getattr(function, "shadows", True)),
         "noisy": bool(getattr(function, "noisy", False)),
         "preparation": preparation,
         "render": render,
     }
-    if not by_rays:
-        what["interpolated"] = 0.0  # a parameter `tolerance` is the user's
     return make_dataclass("UserMethod", items, bases=(Method,), frozen=True, namespace=what)
 
 

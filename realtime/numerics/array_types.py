@@ -23,7 +23,6 @@ PRECISIONS = ("single", "double")
 
 # Contents of arrays, for signatures. Dr.Jit has a class for each precision and backend, so their type is not checked.
 PerRay: TypeAlias = Any  #: one entry per ray: a number, a vector or a colour
-PerTile: TypeAlias = Any  #: one entry per tile of sixteen rays
 Metres: TypeAlias = Any  #: lengths [m]
 PerMetre: TypeAlias = Any  #: extinctions, inverse depths and airlight integrals [1/m]
 

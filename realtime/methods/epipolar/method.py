@@ -11,9 +11,6 @@ marching. A leaf of the tree is linear instead of constant, see `realtime.method
 interpolate the lit fraction of the airlight instead of the airlight: the published scenes are lit by the sun, but near
 a point light the airlight varies as 1 / distance and with the phase function. A fraction lies between 0 and 1, so no
 pixel between samples is brighter than without shadows.
-
-The sampling does not wrap other methods, as `realtime.frame.adaptive_sampling` does: slices are cut for one light and
-hold its tree, which samples and pixels alike descend, and samples lie between the centres of pixels.
 """
 
 from dataclasses import dataclass, replace

@@ -262,11 +262,6 @@ class Method(Parameters):
         jitter = getattr(self, "jitter", "none")
         return isinstance(jitter, str) and jitter != "none"
 
-    @property
-    def interpolated(self) -> float:
-        """How far airlight may be interpolated between the corners of tiles, see `tolerance`."""
-        return getattr(self, "tolerance", 0.0)
-
     def error_causes(self, size: tuple[int, int]) -> tuple[ErrorCause, ...]:
         """Return the causes of its errors in an image of that size [pixels].
 
@@ -295,18 +290,6 @@ def animate() -> Any:
         "none",
         "a new pattern in every frame, or that of frame 0 plus the frame's number times the golden ratio",
         choices=("none", "golden"),
-    )
-
-
-def tolerance() -> Any:
-    """Return the field of the parameter that every method has whose rays can be interpolated."""
-    return parameter(
-        0.0,
-        "error allowed to interpolation between the corners of tiles, as a fraction of the airlight; 0: all pixels are "
-        "computed",
-        least=0,
-        below=1,
-        wanted="a fraction of the airlight from 0 up to 1",
     )
 
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import drjit as dr
 
 from airlight.realtime.errors import InputError
-from airlight.realtime.methods.interface.method import Method, tolerance
+from airlight.realtime.methods.interface.method import Method
 from airlight.realtime.methods.light_volumes.jump_search import with_walls
 from airlight.realtime.methods.light_volumes.published.mesh import THRESHOLD, memory_needed, volume_mesh
 from airlight.realtime.methods.light_volumes.published.raster import mesh_airlight
@@ -80,7 +80,6 @@ class LightVolumes(Method):
         "where the map jumps: at a place that rays find, or across one texel as published; a mesh has slanted ones",
         choices=("upright", "slanted"),
     )
-    tolerance: float = tolerance()
 
     def _check_together(self) -> None:
         if self.tessellation == "adaptive" and self.evaluation != "mesh":
@@ -141,7 +140,7 @@ class LightVolumes(Method):
 
     def error_causes(self, size):
         """Return the causes of its errors, see `Method.error_causes`."""
-        return ("resolution", {"tolerance": 0.0}), ("map", None)
+        return (("map", None),)
 
 
 def _memory_of(light: Light, size: int, evaluation: str) -> int:

@@ -30,7 +30,7 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.realtime.errors import InputError
-from airlight.realtime.methods.interface.method import Layers, Method, View, no_state, tolerance
+from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.methods.shadow_planes.plane_table import PlaneIndex, index_planes
 from airlight.realtime.methods.shadow_planes.published_crossings import Buffer, reaches, sum_crossings
 from airlight.realtime.methods.shadow_planes.published_mesh import (
@@ -125,11 +125,8 @@ class ShadowPlanes(Method):
         also=(0,),
         wanted="0 for the cone itself, or 3 to 4096 edges",
     )
-    tolerance: float = tolerance()
 
     def _check_together(self) -> None:
-        if self.buffer == "8bit" and self.tolerance:
-            raise InputError("buffer=8bit: needs tolerance=0; the buffer holds whole frames, pixel by pixel")
         if self.sum == "gamma" and not self.segments:
             raise InputError(
                 "sum=gamma: needs order=exact, evaluation=pixel and buffer=float; the others add Gammas anyway"
@@ -194,7 +191,7 @@ class ShadowPlanes(Method):
         """Return the causes of its errors, see `Method.error_causes`."""
         return (
             ("buffer", {"buffer": "float"}),
-            ("resolution", {"tolerance": 0.0, "evaluation": "pixel"}),
+            ("resolution", {"evaluation": "pixel"}),
             ("order", {"order": "exact"}),
         )
 

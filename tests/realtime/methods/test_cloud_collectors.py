@@ -139,8 +139,8 @@ def test_the_last_frame_s_collectors_go_on(variant, monkeypatch):
     """Three steps a frame end where forty end."""
     slabs_as_they_are(monkeypatch)
     scene = cloud_scene((64, 48), origin=(30.83, -400.91, 57.03), sun=_sun(ALONG), ring=cloud("ring", ring()))
-    whole = _airlight(scene, iterations=40, tolerance=0.0)
-    options = {"peak": "full", "tolerance": 0.0, "extra_layers": True}
+    whole = _airlight(scene, iterations=40)
+    options = {"peak": "full", "extra_layers": True}
     renderer = _renderer(scene, start="previous", iterations=3, **options)
     still = {"camera_moved": False, "geometry_moved": False, "light_moved": False}
 

@@ -52,11 +52,7 @@ def loops(view):
 def calls(view, *, kernel=None, steps=7, fraction=0.5, word="a", on=True, other=None, **rest):
     return 1.0 if callable(kernel) else 0.0
 calls.shadows = False
-calls.frozen = True
-
-def even(view, slope=0.5): return mi.Color3f(2 + slope * view.direction.x)
-even.by_rays = True
-def own_tolerance(view, tolerance=0.5): return mi.Float(tolerance)
+calls.frozen = calls.by_rays = True
 
 def ready(view, size=2): return mi.Color3f(view.prepared[0])
 ready.prepare = lambda scene, size: lambda scene: (float(size),)
@@ -112,7 +108,7 @@ def test_the_signature_decides(own):
     method = find_method(f"{own}:calls")
     assert method.uses_kernel
     assert defaults(method) == {"steps": 7, "fraction": 0.5, "word": "a", "on": True}
-    assert (method.shadows, method.frozen, method.casts_rays) == (False, True, True)
+    assert (method.shadows, method.frozen, method.by_rays, method.casts_rays) == (False, True, True, True)
     method = find_method(f"{own}:divides")
     assert not method.uses_kernel
     assert (defaults(method), method.shadows, method.frozen) == ({}, True, False)
@@ -136,12 +132,7 @@ def test_what_is_returned_becomes_an_image(render, name, wanted):
     np.testing.assert_array_equal(render(name), np.broadcast_to(wanted, (12, 16, 3)))
 
 
-def test_a_function_of_each_ray_by_itself_is_interpolated(render):
-    """One that says so has a tolerance that it need not take; one that does not may have a parameter of that name."""
-    whole, parted = (render("even", tolerance=tolerance) for tolerance in (0.0, 0.05))
-    np.testing.assert_allclose(parted, whole, rtol=0.05)
-    assert np.any(parted != whole)
-    assert render("own_tolerance", tolerance=0.75)[0, 0, 0] == 0.75
+def test_arguments_with_defaults_are_parameters(render):
     assert render("ready", size=5)[3, 4, 1] == 5
 
 

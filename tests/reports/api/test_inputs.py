@@ -46,9 +46,9 @@ def test_a_kernel_is_a_name_or_a_function_that_another_process_can_import():
 
 
 def test_a_configuration_has_its_own_kernel_and_parameters(variant):
-    chosen = configuration("shadow-planes", "taylor", {"tolerance": 0.01})
+    chosen = configuration("shadow-planes", "taylor", {"points": 8})
     assert configuration_of(chosen, None, {}) is chosen
-    assert configuration_of("shadow-planes", "taylor", {"tolerance": 0.01}) == chosen
+    assert configuration_of("shadow-planes", "taylor", {"points": 8}) == chosen
     with pytest.raises(airlight.InputError, match=r"its own kernel and parameters; leave out kernel, order$"):
         configuration_of(chosen, "exact", {"order": "paper"})
 

@@ -188,7 +188,7 @@ def test_a_path_may_begin_at_home(tmp_path, monkeypatch, capfd):
     [
         (["compare", "open-fog", "a.exr", "--margin", "0,5"], "write 0.5"),
         (["render", "open-fog", "--change", "medium.sigma_t=0,5"], "such as 0.5"),
-        (["render", "open-fog", "--method", "ray-march", "--set", "tolerance=0,5"], "such as 0.5"),
+        (["render", "open-fog", "--method", "cloud-collectors", "--set", "stride=0,5"], "such as 0.5"),
     ],
 )
 def test_decimal_commas_are_refused_with_how_to_write_the_number(variant, words, hint, capfd):

@@ -26,7 +26,7 @@ MISTAKES = (
     ("render open-fog --change medium.sigma=1", "did you mean 'medium.sigma_t'"),
     ("view colonade", "did you mean 'colonnade'"),
     ("view sphere-spot --method shadow-plains", "did you mean 'shadow-planes'"),
-    ("view sphere-spot --set tolerence=1", "did you mean 'tolerance'"),
+    ("view sphere-spot --set pionts=1", "did you mean 'points'"),
     ("view sphere-spot --size huge", "expected WIDTHxHEIGHT"),
     ("view sphere-spot --address 127.0.0.1:70000", "65535"),
     ("reference open-fog --estimator volpath --samples 128 --seconds 3", "samples and seconds exclude"),

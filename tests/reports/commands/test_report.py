@@ -119,10 +119,10 @@ def test_methods_and_parameters_are_those_of_render_and_bench(variant, handed_on
     assert handed_on["scenes"] == ("open-fog",)
     assert _measured(handed_on) == [("ray-march", None, {"steps": 32})]
     named = ["--method", "shadow-planes", "--method", "light-volumes", "--set", "kernel=taylor"]
-    assert run(["report", "open-fog", *named, "--set", "tolerance=0.01"]) == 0
+    assert run(["report", "open-fog", *named, "--set", "points=8"]) == 0
     assert _measured(handed_on) == [
-        ("shadow-planes", "taylor", {"tolerance": 0.01}),
-        ("light-volumes", "taylor", {"tolerance": 0.01}),
+        ("shadow-planes", "taylor", {"points": 8}),
+        ("light-volumes", "taylor", {"points": 8}),
     ]
 
 

@@ -69,7 +69,7 @@ def _children(parent):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_it_and_its_processes_without_a_word(number):
     process = subprocess.Popen(
-        [sys.executable, "-m", "airlight", "view", "sphere-spot", *SMALL, "--set", "tolerance=0.01"],
+        [sys.executable, "-m", "airlight", "view", "sphere-spot", *SMALL, "--set", "points=4"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -190,7 +190,7 @@ def test_frames_of_a_scene_that_changes_are_judged_as_they_were_shown(view, monk
 @pytest.mark.parametrize(
     ("message", "says"),
     [
-        ({"kind": "choose", "parameter": "tolerance", "value": -1}, "tolerance: got -1"),
+        ({"kind": "choose", "parameter": "points", "value": -1}, "points: got -1"),
         ({"kind": "choose", "method": "shadow-plains"}, "did you mean 'shadow-planes'?"),
         ({"kind": "change", "changes": {"medium.sigma": [1]}}, "did you mean 'medium.sigma_t'?"),
     ],

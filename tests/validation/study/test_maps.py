@@ -113,12 +113,12 @@ def causes(parts):
 @pytest.mark.parametrize(
     ("method", "kernel", "parameters"),
     [
-        ("ray-march", None, {"steps": 9, "shadow": "map", "map": 64, "tolerance": 0.01}),
+        ("ray-march", None, {"steps": 9, "shadow": "map", "map": 64}),
         *(
             pytest.param(*case, marks=pytest.mark.slow)
             for case in (
                 ("unshadowed", "taylor", {}),
-                ("shadow-planes", "taylor", {"order": "none", "tolerance": 0.1}),
+                ("shadow-planes", "taylor", {"order": "none"}),
                 ("light-volumes", None, {"map": 64}),
                 ("min-max", None, {"map": 64}),
                 ("froxel-fog", None, {"width": 8, "height": 6, "slices": 8, "map": 64}),
