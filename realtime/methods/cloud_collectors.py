@@ -36,7 +36,6 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.realtime.clouds.canonical.coordinates import OPACITY, ORDER_LAYERS, SETS, fraction_of_peak, slab_phase
-from airlight.realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from airlight.realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from airlight.realtime.clouds.collector_search import Collector, OrdersLight, Search, light_of_orders
 from airlight.realtime.clouds.density_maps import (
@@ -97,9 +96,6 @@ class CloudCollectors(Method):
         "cold",
         "a search starts at the point itself, or with the collector of the last frame",
         choices=("cold", "previous"),
-    )
-    transport: str = parameter(
-        "grid", "the canonical transport by its grid, or by the paper's functions", choices=("grid", "fit")
     )
     thickness: str = parameter(
         "slab", "thickness of slabs across their faces, or along the light as printed", choices=("slab", "light")
@@ -257,9 +253,7 @@ def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling,
             slab_phase(known, types, modified=parameters.peak != "full"),
             albedo * (1 - fraction) / (1 - albedo * fraction),
         )
-        transport: Any = on_device(canonical_transport(*medium), types)
-        if parameters.transport == "fit":
-            transport = fit_on_device(fitted_functions(*medium, transport, types), types)
+        transport = on_device(canonical_transport(*medium), types)
         by_channel = (mi.UInt32(row.astype(np.uint32)) if row.any() else None for row in filled)
         fillings.append(Filling(transport, tuple(by_channel)))
     lefts = tuple(types.scalar(row) for row in left)

@@ -125,7 +125,7 @@ _ORDERS = ("2", "5-6", "13-18", "31-inf")  # that are drawn
 _WAYS = {
     "exact": ("-", "blue", "computed"),
     "grid": (":", "green", "grid of frames"),
-    "fit": ("--", "vermillion", "22 functions"),
+    "fit": ("--", "vermillion", "fitted functions"),
 }
 
 

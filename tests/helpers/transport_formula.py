@@ -39,7 +39,7 @@ def slabs_as_they_are(monkeypatch) -> None:
 
 
 def use_formula(monkeypatch) -> None:
-    """Let `cloud-collectors` ask the formula, whatever its transport."""
+    """Let `cloud-collectors` ask the formula."""
 
     def on_device(transport, types):
         weights = types.scalar(WEIGHTS)
@@ -48,5 +48,3 @@ def use_formula(monkeypatch) -> None:
 
     monkeypatch.setattr(method, "canonical_transport", lambda phase, albedo: None)
     monkeypatch.setattr(method, "on_device", on_device)
-    monkeypatch.setattr(method, "fitted_functions", lambda phase, albedo, look_up, types: look_up)
-    monkeypatch.setattr(method, "fit_on_device", lambda look_up, types: look_up)

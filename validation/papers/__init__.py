@@ -11,6 +11,7 @@ Read in this order:
 - `light_volumes.py`: meshes, depths and maps of light volumes
 - `billeter_tables.py`: Figures 6 and 7 and Table 1 of Billeter 2010
 - `soft_shafts.py`: the figures of Ali 2016
+- `fitted_transport.py`: the functions that Bouthors 2008 fits to the light of slabs
 - `slab.py`: what a slab decides of Bouthors 2008
 - `clouds.py`: the clouds of Bouthors 2008
 - `pictures.py`: the pictures of papers again

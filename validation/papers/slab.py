@@ -4,7 +4,7 @@
 Clouds are of droplets with r_e = 6 um, gamma = 2, 4e8 in a cubic metre, at 0.55 um; lengths in metres become optical by
 their extinction, lowered by what is cut out of the peak where the phase function is the modified one. For Fig. 8, light
 by direction, three ways to T stand side by side: the computation with more streams than the grid had, the grid that
-frames look up, and the paper's 22 functions, fitted to the grid.
+frames look up, and the paper's functions, fitted to the grid (`fitted_transport.py`).
 """
 
 import math
@@ -18,11 +18,11 @@ import numpy as np
 from airlight.analytic.droplets import Modified, optics
 from airlight.realtime.clouds.canonical.coordinates import SETS, set_name
 from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
-from airlight.realtime.clouds.canonical.fit import fit_on_device, fitted_functions
 from airlight.realtime.clouds.canonical.transport_grid import Transport, canonical_transport, on_device
 from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase, SlabPhase
 from airlight.realtime.numerics.array_types import ArrayTypes, array_types
 from airlight.validation.arrays import Array
+from airlight.validation.papers.fitted_transport import fit_radiance
 from airlight.validation.slab.moments import DOWN, UP, SlabOrders, order_sets
 from airlight.validation.slab.phases import droplet_phase, phase_pair
 
@@ -109,7 +109,7 @@ def _by_azimuth(lowered: float, phase: SlabPhase) -> dict[str, float]:
 
 
 def transport_figures() -> dict[str, Any]:
-    """Return by how much the 22 functions are off in half of the directions, the median over the curves [%]."""
+    """Return by how much the paper's functions are off in half of the directions, the median over the curves [%]."""
     medians = []
     for curve in transport_curves():
         shown = curve.exact > _DIM * curve.whole
@@ -136,7 +136,7 @@ def transport_curves() -> list[TransportCurve]:
     """Return T of Fig. 8 by direction."""
     pair, types = phase_pair("mie-modified"), array_types("single")
     grid = on_device(canonical_transport(pair.deterministic, 1.0), types)
-    fit = fit_on_device(fitted_functions(pair.deterministic, 1.0, grid, types), types)
+    fit = fit_radiance(grid, types)
     lowered = (1 - Modified(optics()).removed) * optics().extinction
     angles = (np.arange(_ANGLES) + 0.5) * np.pi / _ANGLES
     slab = DirectionalMoments(
@@ -148,18 +148,17 @@ def transport_curves() -> list[TransportCurve]:
         modes = slab(t, [math.cos(math.radians(SUN))], at)[:, :, 0, 0]
         twice = np.where(np.arange(modes.shape[1]) > 0, 2.0, 1.0)
         exact = np.einsum("smdv,m->sdv", modes, twice)
-        for place, depth in enumerate(depths):
+        for place, depth in enumerate(at):
             for orders in range(len(SETS)):
-                looked_up, fitted = (_looked_up(each, types, orders, t, at[place], angles) for each in (grid, fit))
                 curves.append(
                     TransportCurve(
                         thickness=thickness,
-                        depth=depth,
+                        depth=depths[place],
                         orders=set_name(orders),
                         angle=np.degrees(angles),
                         exact=exact[orders, place],
-                        grid=looked_up,
-                        fit=fitted,
+                        grid=_looked_up(grid, types, orders, t, depth, angles),
+                        fit=fit[orders](t, depth, np.cos(angles), math.cos(math.radians(SUN))),
                         whole=exact[:, place].sum(0),
                     )
                 )

@@ -6,6 +6,5 @@ Read in this order:
 - `directional_moments.py`: the light of slabs in any direction by sets, with the moments of its displacement;
 - `coordinates.py`: the coordinates of the grid;
 - `transport_grid.py`: the grid of a phase function and albedo, computed once and cached, and its look-up in frames;
-- `kept.py`: numbers on disk;
-- `fit.py`: the 22 functions of the paper, fitted to the grid.
+- `kept.py`: numbers on disk.
 """

@@ -178,8 +178,7 @@ def referenced(path: Path, estimator: str) -> Path:
 
 def rendered(path: Path, method: str) -> Path:
     file = path.with_name(f"{method}.exr")
-    quick = ["--set", "transport=fit"] if method == "cloud-collectors" else []  # its grid takes minutes, once
-    text, data = same_numbers(path.parent, "render", path, "--method", method, *quick, "-o", file)
+    text, data = same_numbers(path.parent, "render", path, "--method", method, "-o", file)
     assert f"{data['scene']} by {data['label']}" in text
     assert data["method"] == method
     assert read_exr(file).layers["airlight"].shape == (HEIGHT, WIDTH, 3)

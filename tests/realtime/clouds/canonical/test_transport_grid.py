@@ -5,12 +5,9 @@ import drjit as dr
 import numpy as np
 import pytest
 
-import airlight.realtime.clouds.canonical.fit as fit_module
 import airlight.realtime.clouds.canonical.transport_grid as grid_module
 from airlight.realtime.clouds.canonical import coordinates
-from airlight.realtime.clouds.canonical.coordinates import SETS
 from airlight.realtime.clouds.canonical.directional_moments import DirectionalMoments
-from airlight.realtime.clouds.canonical.fit import _directions, fit_on_device, fit_transport
 from airlight.realtime.clouds.canonical.transport_grid import canonical_transport, on_device
 from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from airlight.realtime.numerics.array_types import array_types
@@ -109,41 +106,3 @@ def test_outside_the_grid_what_happens_is_what_the_page_says(look_up):
         np.testing.assert_allclose(thick, thickest, rtol=1e-3)
         np.testing.assert_allclose(lower, [0.5 * low[0], *low[1:]], rtol=1e-4)
         np.testing.assert_allclose(night, [0, *low[1:]], rtol=1e-4)
-
-
-def _printed(number, t, d, mu, cos_phi, sin_phi, mu_l):
-    """Return a transport of the form of Bouthors 2008, section 5.2, with our own numbers and depths in fractions of t.
-
-    A bell at a depth that does not shrink with t is beyond thin slabs, where nothing of it is left to fit.
-    """
-    phi_l = dr.acos(mu_l)
-    b, shift = (0.4 + 0.1 * mu - 0.05 * mu_l) * t, 2.3 + 0.2 * mu
-    bell = dr.exp(-0.5 * dr.square((d - b) / (0.6 * t)))
-    T = (0.7 + 0.2 * mu) * mu_l * dr.log(d + shift) / dr.log(b + shift) * bell
-    depth = dr.log(1 + 0.8 * d)
-    along = (-0.2 + 0.1 * (cos_phi * dr.sin(0.9 * phi_l) + 0.3 * phi_l)) * depth + 0.05 + 0.2 * mu_l * cos_phi
-    across = sin_phi * (-0.4 * dr.sin(1.2 * phi_l) * depth - 0.3 * dr.sin(phi_l))
-    return T, along, across, 0.2 + 0.03 * t * dr.log(1 + 0.7 * d) + 0.4 * dr.log(1 + 1.3 * t)
-
-
-@pytest.mark.slow
-def test_a_transport_of_the_printed_form_is_fitted_by_itself(variant, monkeypatch):
-    """The 22 functions, fitted and looked up, at entries of their tables: between these they are interpolated.
-
-    In 12 steps a fit ends within some thousandths: a tenth of the 10 to 30 % by which the form misses real transport.
-    """
-    thicknesses, directions = 4, 5
-    for name, value in (("SETS", SETS[:2]), ("_THICKNESSES", thicknesses), ("_DIRECTIONS", directions)):
-        monkeypatch.setattr(fit_module, name, value)
-    types, random = array_types(), np.random.default_rng(3)
-    fitted = fit_on_device(fit_transport(_printed, types), types)
-    axes = coordinates.thicknesses(thicknesses), _directions(directions), coordinates.suns(5)
-    t, mu, mu_l = (random.choice(axis, 2000) for axis in axes)
-    d, phi = t * random.uniform(0, 1, 2000), random.uniform(0, 2 * np.pi, 2000)
-    for number in range(2):
-        found, expected = (values(each, number, t, d, mu, phi, mu_l) for each in (fitted, _printed))
-        T, sigma = expected[0], expected[3]
-        lit = T.max() * 0.02 < T
-        assert np.percentile(np.abs(found[0][lit] / T[lit] - 1), 95) < 0.02
-        assert np.percentile(np.hypot(*(found[1:3] - expected[1:3])) / sigma, 95) < 0.02
-        assert np.abs(found[3] / sigma - 1).max() < 1e-3
