@@ -174,8 +174,10 @@ def turned_objects(scene: Scene, objects: Objects, turn: Array) -> Scene:
 
 def closed_shapes(occluders: Occluders) -> tuple[str, ...]:
     """Return the names of the shapes all of whose components are closed: things, not floors and walls."""
-    closed = [occluders.closed[occluders.owner == number] for number in range(len(occluders.shapes))]
-    return tuple(name for (name, _, _), own in zip(occluders.shapes, closed) if len(own) and own.all())
+    component_shape = occluders.component_shape
+    open_shapes = component_shape[~occluders.closed]
+    closed = np.setdiff1d(component_shape, open_shapes)
+    return tuple(occluders.shapes[number] for number in closed)
 
 
 def _like(old, values):

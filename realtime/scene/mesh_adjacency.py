@@ -1,27 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Occluders: the triangles of a scene and how they hang together.
 
-Adjacency is computed once; when a light moves only signs change (`realtime.methods.shadow_planes.silhouettes`), when
-an object moves only its vertices (`with_positions`).
+Vertices of a shape that coincide exactly are one vertex: meshes come with seams where texture coordinates differ. How
+triangles hang together is the signed incidence matrix of edges and triangles: with an edge e from its lower vertex
+number a to its higher one b, and a triangle t,
 
-Vertices that coincide exactly are one vertex: meshes come with seams where texture coordinates differ. An edge is met
-by *half-edges*, one for each triangle at it, each with a direction. Half-edges of an edge are paired, opposite ones
-first, and each pair is one entry of `Occluders.edges`; one that finds no partner is an entry whose second triangle is
-`Occluders.none`. A manifold edge is therefore one entry, a border edge is one entry with a single triangle, and an edge
-at which four triangles meet is two entries, whose sum does not depend on the pairing.
+    s_te = +1 if t runs along e from a to b, -1 if it runs from b to a, 0 if e is no edge of t.
+
+Its product with the layers of triangles gives silhouettes (`realtime.methods.shadow_planes.silhouettes`). Triangles are
+of one component if they share an edge. A component is closed if each of its edges is met as often one way as the other:
+if the sum of s_te over the triangles is 0.
+
+The matrix is made once; when a light moves only signs of triangles change, when an object moves only its vertices
+(`with_positions`).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.realtime.area_lights.shape import AreaLight, occluder_triangles, occluder_vertices
+from airlight.realtime.area_lights.shape import (
+    AreaLight,
+    occluder_triangles,
+    occluder_vertices,
+)
 from airlight.realtime.errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
@@ -35,25 +46,25 @@ class Occluders:
     triangles: Index  #: vertex numbers, (triangles, 3)
     normals: Array  #: (v1 - v0) x (v2 - v0) [m^2], (triangles, 3)
     offsets: Array  #: normal . v0 [m^3], (triangles,)
-    edges: Index  #: vertex numbers of the entries, (entries, 2)
-    left: Index  #: triangle that runs along the entry from its first vertex to its second
-    right: Index  #: the other triangle, or `none`
-    same_way: NDArray[np.bool_]  #: whether `right` runs along the entry in the same direction as `left`
+    edges: Index  #: vertex numbers, the lower one first, (edges, 2)
+    incidence: "csr_array[np.int32]"  #: s_te, (edges, triangles)
     component: Index  #: connected component that each triangle belongs to
     closed: NDArray[np.bool_]  #: by component: whether every edge is met as often one way as the other
     boxes: Array  #: by component: lower and upper corner of its bounding box [m], (components, 2, 3)
-    shapes: tuple[tuple[str, int, Index], ...]  #: name, its first vertex, and which of the shape's own each one is
-    owner: NDArray[np.int64]  #: by component: the number of its shape
+    shapes: tuple[str, ...]  #: names
+    vertex_shape: Index  #: by vertex: the number of its shape
+    vertex_source: Index  #: by vertex: its number among the vertices of its shape, the first of equal ones
     warnings: tuple[str, ...] = ()  #: what is odd about the meshes, by name
 
     @property
-    def none(self) -> int:
-        """The number that stands for no triangle."""
-        return len(self.triangles)
+    def component_shape(self) -> Index:
+        """By component: the number of its shape."""
+        _, triangle = np.unique(self.component, return_index=True)
+        return self.vertex_shape[self.triangles[triangle, 0]]
 
     def of_shape(self, name: str) -> NDArray[np.bool_]:
-        """Return which components are of a shape."""
-        return np.isin(self.owner, [number for number, (own, _, _) in enumerate(self.shapes) if own == name])
+        """Return which components are of the shapes of a name."""
+        return np.array([shape == name for shape in self.shapes])[self.component_shape]
 
 
 def read_occluders(scene, area_lights: Sequence[AreaLight] = ()) -> Occluders:
@@ -63,11 +74,11 @@ def read_occluders(scene, area_lights: Sequence[AreaLight] = ()) -> Occluders:
     extent: those that are opaque have triangles even where their shapes have none. Raises InputError for a shape that
     has no triangles, with its name.
     """
-    known = {light.name: light for light in area_lights}
+    lights = {light.name: light for light in area_lights}
     meshes = []
     for shape in scene.shapes():
-        if shape.is_emitter() and shape.id() in known:
-            light = known[shape.id()]
+        if shape.is_emitter() and shape.id() in lights:
+            light = lights[shape.id()]
             meshes.append((light.name, occluder_vertices(light), occluder_triangles(light)))
             continue
         if shape.bsdf() is not None and mi.has_flag(shape.bsdf().flags(), mi.BSDFFlags.Null):
@@ -76,37 +87,38 @@ def read_occluders(scene, area_lights: Sequence[AreaLight] = ()) -> Occluders:
     return make_occluders(meshes)
 
 
-def make_occluders(meshes) -> Occluders:
+def make_occluders(meshes: Sequence[tuple[str, Array, NDArray[Any]]]) -> Occluders:
     """Return the occluders of meshes.
 
     `meshes`: (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are
     left out, the latter with a warning.
     """
-    parts, warnings, shapes, first_vertex, first_component = [], [], [], 0, 0
-    for name, vertices, triangles in meshes:
-        part, remarks, own = _mesh_part(name, vertices, triangles)
-        shapes.append((name, first_vertex, own))
-        parts.append(_shifted(part, first_vertex, first_component))
-        first_vertex += len(part["vertices"])
-        first_component += len(part["closed"])
-        warnings += remarks
-    if not parts:
-        parts = [_mesh_part("none", np.zeros((0, 3)), np.zeros((0, 3), dtype=int))[0]]
-    first_triangle = np.cumsum([0] + [len(part["triangles"]) for part in parts])
-    for part, first in zip(parts, first_triangle):
-        count = len(part["triangles"])
-        for side in ("left", "right"):
-            part[side] = np.where(part[side] == count, first_triangle[-1], part[side] + first)
-    joined: dict[str, Any] = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    for key in ("triangles", "edges", "left", "right", "component"):
-        joined[key] = np.ascontiguousarray(joined[key], dtype=np.int32)
-    owner = np.repeat(np.arange(len(parts)), [len(part["closed"]) for part in parts])
-    return Occluders(
-        **joined,
-        shapes=tuple(shapes),
-        owner=owner,
-        warnings=tuple(warnings),
+    names = tuple(name for name, _, _ in meshes)
+    vertices, vertex_shape, vertex_source, triangles = _joined(meshes)
+
+    # A triangle that is a line stays: it closes the gap between a long edge and the two halves on its other side.
+    triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    repeated = np.delete(vertex_shape[triangles[:, 0]], first)
+    triangles = triangles[np.sort(first)]
+
+    edges, incidence, component, closed = _hang_together(triangles, len(vertices))
+    normals, offsets = _planes(vertices, triangles)
+    occluders = Occluders(
+        vertices=vertices,
+        triangles=triangles,
+        normals=normals,
+        offsets=offsets,
+        edges=edges,
+        incidence=incidence,
+        component=component,
+        closed=closed,
+        boxes=_boxes(vertices, triangles, component, len(closed)),
+        shapes=names,
+        vertex_shape=vertex_shape,
+        vertex_source=vertex_source,
     )
+    return replace(occluders, warnings=_warnings(occluders, repeated))
 
 
 def with_positions(occluders: Occluders, positions: Mapping[str, Array]) -> Occluders:
@@ -114,9 +126,10 @@ def with_positions(occluders: Occluders, positions: Mapping[str, Array]) -> Occl
     if not positions:
         return occluders
     vertices = occluders.vertices.copy()
-    for name, first, own in occluders.shapes:
+    for number, name in enumerate(occluders.shapes):
         if name in positions:
-            vertices[first : first + len(own)] = positions[name][own]
+            moved = occluders.vertex_shape == number
+            vertices[moved] = positions[name][occluders.vertex_source[moved]]
     normals, offsets = _planes(vertices, occluders.triangles)
     boxes = _boxes(vertices, occluders.triangles, occluders.component, len(occluders.closed))
     return replace(occluders, vertices=vertices, normals=normals, offsets=offsets, boxes=boxes)
@@ -144,57 +157,76 @@ def _triangles(shape) -> tuple[Array, NDArray[np.int64]]:
     )
 
 
-def _mesh_part(name: str, vertices: Array, triangles: NDArray[Any]) -> tuple[dict[str, Any], list[str], Index]:
+def _joined(meshes) -> tuple[Array, Index, Index, Index]:
+    """Return the vertices of all meshes, equal ones of a mesh once, the shape and source of each, and the triangles."""
+    places, triangles, count = [np.zeros((0, 4))], [np.zeros((0, 3), dtype=np.int64)], 0
+    sources = [np.zeros(0, dtype=np.int64)]
+    for number, (_, vertices, faces) in enumerate(meshes):
+        vertices = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
+        places.append(np.insert(vertices, 0, number, axis=1))
+        sources.append(np.arange(len(vertices)))
+        triangles.append(np.asarray(faces, dtype=np.int64).reshape(-1, 3) + count)
+        count += len(vertices)
+    # The number of the shape keeps vertices of different shapes apart.
+    joined, first, number_of = np.unique(np.concatenate(places), axis=0, return_index=True, return_inverse=True)
+    return (
+        np.ascontiguousarray(joined[:, 1:]),
+        joined[:, 0].astype(np.int32),
+        np.concatenate(sources)[first].astype(np.int32),
+        number_of.reshape(-1)[np.concatenate(triangles)].astype(np.int32),
+    )
+
+
+def _hang_together(triangles: Index, vertices: int) -> tuple[Index, "csr_array[np.int32]", Index, NDArray[np.bool_]]:
+    """Return the edges of triangles, their incidence matrix, the component of each triangle, and which are closed."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    # Each triangle has three half-edges, and those between the same two vertices are one edge.
+    tail, head = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel()
+    keys, edge = np.unique(np.minimum(tail, head) * vertices + np.maximum(tail, head), return_inverse=True)
+    edges = np.stack(np.divmod(keys, max(vertices, 1)), axis=1).astype(np.int32)
+    triangle = np.repeat(np.arange(len(triangles)), 3)
+    sign = np.where(tail < head, np.int32(1), np.int32(-1))
+    shape = len(edges), len(triangles)
+    incidence = coo_array((sign, (edge, triangle)), shape=shape).tocsr()
+
+    # A graph in which each triangle is linked to its three edges has the components of the triangles.
+    nodes = sum(shape)
+    links = coo_array((np.ones(len(edge), dtype=np.int8), (triangle, edge + len(triangles))), shape=(nodes, nodes))
+    count, component = connected_components(links, directed=False) if nodes else (0, np.zeros(0, dtype=np.int32))
+    component = component[: len(triangles)]
+    closed = np.ones(count, dtype=bool)
+    closed[component[triangle[incidence.sum(axis=1)[edge] != 0]]] = False
+    return edges, incidence, component, closed
+
+
+def _warnings(occluders: Occluders, repeated: Index) -> tuple[str, ...]:
+    """Return what is odd about the meshes; `repeated`: by triangle that was left out, the number of its shape."""
     warnings = []
-    vertices = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
-    vertices, own, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    triangles = inverse.reshape(-1)[np.asarray(triangles, dtype=np.int64).reshape(-1, 3)]
-    # A triangle that is a line stays: it closes the gap between a long edge and the two halves on its other side.
-    triangles = triangles[np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)]
-    _, kept = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
-    if len(kept) < len(triangles):
-        warnings.append(f"shape '{name}' has {len(triangles) - len(kept)} repeated triangles: each is used once")
-        triangles = triangles[np.sort(kept)]
-    normals, offsets = _planes(vertices, triangles)
-    edges, left, right, same_way, met = _paired_edges(triangles)
-    component, closed = _connected_components(triangles, edges, (left, right, same_way))
-    if np.any(met > 2):
-        warnings.append(
-            f"shape '{name}' has {int(np.sum(met > 2))} edges at which more than two triangles meet: right with "
-            "order=exact; order=none and order=paper may count planes twice"
-        )
-    if np.any(right == len(triangles)):
-        warnings.append(
-            f"shape '{name}' is open: its border casts shadow planes too; right with order=exact; order=none and "
-            "order=paper count its folds twice"
-        )
-    elif not np.all(closed):
-        warnings.append(
-            f"shape '{name}' has triangles that run both ways round: each is turned to the light; right with "
-            "order=exact; order=none and order=paper count its folds twice"
-        )
-    part = {
-        "vertices": vertices,
-        "triangles": triangles,
-        "normals": normals,
-        "offsets": offsets,
-        "edges": edges,
-        "left": left,
-        "right": right,
-        "same_way": same_way,
-        "component": component,
-        "closed": closed,
-        "boxes": _boxes(vertices, triangles, component, len(closed)),
-    }
-    return part, warnings, own.astype(np.int32)
-
-
-def _shifted(part: dict[str, Any], vertex: int, component: int) -> dict[str, Any]:
-    return part | {
-        "triangles": part["triangles"] + vertex,
-        "edges": part["edges"] + vertex,
-        "component": part["component"] + component,
-    }
+    meeting = abs(occluders.incidence).sum(axis=1)
+    edge_shape, component_shape = occluders.vertex_shape[occluders.edges[:, 0]], occluders.component_shape
+    for number, name in enumerate(occluders.shapes):
+        met = meeting[edge_shape == number]
+        if copies := np.count_nonzero(repeated == number):
+            warnings.append(f"shape '{name}' has {copies} repeated triangles: each is used once")
+        if crowded := np.count_nonzero(met > 2):
+            warnings.append(
+                f"shape '{name}' has {crowded} edges at which more than two triangles meet: right with "
+                "order=exact; order=none and order=paper may count planes twice"
+            )
+        # With an odd number of triangles at an edge one of them ends there.
+        if np.any(met % 2 == 1):
+            warnings.append(
+                f"shape '{name}' is open: its border casts shadow planes too; right with order=exact; order=none and "
+                "order=paper count its folds twice"
+            )
+        elif not np.all(occluders.closed[component_shape == number]):
+            warnings.append(
+                f"shape '{name}' has triangles that run both ways round: each is turned to the light; right with "
+                "order=exact; order=none and order=paper count its folds twice"
+            )
+    return tuple(warnings)
 
 
 def _planes(vertices: Array, triangles) -> tuple[Array, Array]:
@@ -214,70 +246,6 @@ def _boxes(vertices: Array, triangles, component, components: int) -> Array:
         return np.zeros((0, 2, 3))
     low, high = np.minimum.reduceat(corners.min(axis=1), starts), np.maximum.reduceat(corners.max(axis=1), starts)
     return np.stack([low, high], axis=1)
-
-
-def _paired_edges(triangles: NDArray[Any]):
-    """Pair the half-edges of every edge, opposite directions first.
-
-    Sorted by edge, then by direction, the half-edges of an edge are a run of `forward` ones followed by `backward`
-    ones. The first min(forward, backward) of both are partners; the rest are of one direction and pair up among
-    themselves.
-    """
-    count = len(triangles)
-    tail = triangles.reshape(-1)
-    head = np.roll(triangles, -1, axis=1).reshape(-1)
-    triangle = np.repeat(np.arange(count), 3)
-    backward = tail > head
-    low, high = np.minimum(tail, head), np.maximum(tail, head)
-    order = np.lexsort((backward, high, low))
-    low, high, backward, triangle = low[order], high[order], backward[order], triangle[order]
-    starts = np.flatnonzero(np.r_[True, (low[1:] != low[:-1]) | (high[1:] != high[:-1])][: len(low)])
-    met = np.diff(np.r_[starts, len(low)])
-    forward_count = np.add.reduceat((~backward).astype(int), starts) if len(starts) else np.zeros(0, dtype=int)
-    matched = np.minimum(forward_count, met - forward_count)
-    rank = np.arange(len(low)) - np.repeat(starts, met)
-    in_direction = np.where(backward, rank - np.repeat(forward_count, met), rank)
-    rest = in_direction - np.repeat(matched, met)
-    is_left = np.where(rest < 0, ~backward, rest % 2 == 0)
-    # Keys that partners share: the edge, whether they are matched, and the rank among their likes.
-    first = np.flatnonzero(is_left)
-    partner = np.where(
-        rest[first] < 0,
-        np.repeat(starts + forward_count, met)[first] + in_direction[first],
-        first + 1,
-    )
-    run_end = np.repeat(starts + met, met)[first]
-    same_direction = (partner < run_end) & (backward[np.minimum(partner, len(low) - 1)] == backward[first])
-    alone = (rest[first] >= 0) & ~same_direction
-    right = np.where(alone, count, triangle[np.minimum(partner, len(low) - 1)]) if len(first) else first
-    tail_vertex = np.where(backward[first], high[first], low[first])
-    head_vertex = np.where(backward[first], low[first], high[first])
-    edges = np.stack([tail_vertex, head_vertex], axis=1)
-    return edges, triangle[first], right, (rest[first] >= 0) & ~alone, met
-
-
-def _connected_components(triangles, edges, entries):
-    """Return the connected component of every triangle, and by component whether it is closed."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    left, right, same_way = entries
-    count = len(triangles)
-    if not count:
-        return np.zeros(0, dtype=int), np.zeros(0, dtype=bool)
-    # Triangles that share an edge, however many meet there.
-    both = right < count
-    links = [(left[both], right[both])]
-    order = np.lexsort((edges.max(axis=1), edges.min(axis=1)))
-    key = np.sort(edges[order], axis=1)
-    again = np.flatnonzero(np.all(key[1:] == key[:-1], axis=1))
-    links.append((left[order[again]], left[order[again + 1]]))
-    first, second = (np.concatenate([link[side] for link in links]) for side in (0, 1))
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
-    components, component = connected_components(graph, directed=False)
-    closed = np.ones(components, dtype=bool)
-    closed[component[left[~both | same_way]]] = False
-    return component, closed
 
 
 def scene_of(shapes: Sequence[Any], others: dict[str, Any] | None = None) -> Any:

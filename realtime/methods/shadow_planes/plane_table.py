@@ -106,7 +106,7 @@ class Planes:
     lines: Array  #: (planes, 4)
     first: NDArray[np.float32]
     last: NDArray[np.float32]
-    gain: NDArray[np.int8]
+    gain: NDArray[np.int32]
     ends: Array  #: of the edge [m], (planes, 6)
     centre: Array  #: cosine between the axis and the middle of the edge, Biri section 5.1.4; w = 0: -c of the middle
 
@@ -142,7 +142,7 @@ def shadow_planes(occluders: Occluders, edges: Silhouette, basis: LightBasis) ->
     return edge_planes(basis.coordinates(occluders.vertices[edges.edges]), edges.coefficient, w=basis.w)
 
 
-def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -> Planes:
+def edge_planes(vertices: Array, coefficient: NDArray[np.int32], *, w: int = 1) -> Planes:
     """Return the shadow planes of edges in the frame, ends (edges, 2, 3), with their coefficients."""
     a, b = vertices[:, 0], vertices[:, 1]
     azimuth = host_diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
@@ -153,7 +153,7 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int8], *, w: int = 1) -
     last = np.where(ahead, azimuth[:, 1], azimuth[:, 0])
     # As the light sees it, with the camera's end of the axis up, azimuth grows to the left and psi downwards: the
     # layers left of an edge that leads to the left lie below it, at larger psi.
-    gain = np.where(ahead, coefficient, -coefficient).astype(np.int8)
+    gain = np.where(ahead, coefficient, -coefficient)
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     # The edge meets the axis itself: any tiny number keeps the loop closed.
     cross = np.where(cross == 0, 1e-12 * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), cross)
@@ -353,7 +353,7 @@ def index_planes(
     planes = shadow_planes(occluders, silhouette(occluders, light, used=used), basis)
     if ring is not None:
         edges = NEARNESS * basis.distance * ring_edges(ring) @ axes.T
-        planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int8)))
+        planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int32)))
         layers += is_outside(ring, axes[2])
     planes = _parted(planes)
     start, entries, bounds, scale = wedge_lists(planes, order=order)

@@ -57,25 +57,26 @@ class Silhouette:
     """Directed edges about which shadow volumes turn."""
 
     edges: NDArray[np.int32]  #: vertex numbers, (edges, 2)
-    coefficient: NDArray[np.int8]  #: layers to the left of the edge, as the light sees it, less those to its right
+    coefficient: NDArray[
+        np.int32
+    ]  #: c_e: layers to the left of the edge, as the light sees it, less those to its right
 
 
-def facing(occluders: Occluders, light: Array) -> NDArray[np.int8]:
-    """Return by triangle whether its front faces a light: 1 yes, -1 no, 0 edge-on; and a last 0 for no triangle."""
+def facing(occluders: Occluders, light: Array) -> NDArray[np.int32]:
+    """Return by triangle whether its front faces a light: 1 yes, -1 no, 0 edge-on."""
     l, w = place_and_weight(np.asarray(light, dtype=np.float64))  # noqa: E741
-    return np.append(np.sign(occluders.normals @ l - w * occluders.offsets), 0).astype(np.int8)
+    return np.sign(occluders.normals @ l - w * occluders.offsets).astype(np.int32)
 
 
-def layers(occluders: Occluders, light: Array) -> NDArray[np.int8]:
-    """Return the number of layers that each triangle stands for, (triangles + 1,), with a last 0 for no triangle.
+def layers(occluders: Occluders, light: Array) -> NDArray[np.int32]:
+    """Return w, the number of layers that each triangle stands for.
 
     `light` is a homogeneous position, (4,), or a place, (3,) [m].
     """
     sign = facing(occluders, light)
     if occluders.closed.all():
         return np.maximum(sign, 0)
-    is_open = np.append(~occluders.closed[occluders.component], False)
-    return np.where(is_open, sign, np.maximum(sign, 0))
+    return np.where(occluders.closed[occluders.component], np.maximum(sign, 0), sign)
 
 
 def silhouette(occluders: Occluders, light: Array, *, used: NDArray[np.bool_] | None = None) -> Silhouette:
@@ -89,11 +90,8 @@ def silhouette(occluders: Occluders, light: Array, *, used: NDArray[np.bool_] | 
     """
     weight = layers(occluders, light)
     if used is not None and not used.all():
-        weight[:-1][~used[occluders.component]] = 0
-    right = weight[occluders.right]
-    if occluders.same_way.any():
-        right = np.where(occluders.same_way, -right, right)
-    coefficient = weight[occluders.left] - right
+        weight[~used[occluders.component]] = 0
+    coefficient = occluders.incidence @ weight
     on_silhouette = np.flatnonzero(coefficient)
     return Silhouette(occluders.edges[on_silhouette], coefficient[on_silhouette])
 

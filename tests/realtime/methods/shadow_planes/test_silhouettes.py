@@ -10,13 +10,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from airlight.realtime.methods.shadow_planes.plane_table import layers_between, light_basis
+from airlight.realtime.errors import InputError
+from airlight.realtime.methods.shadow_planes.plane_table import index_planes, layers_between, light_basis
 from airlight.realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
+from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.camera import read_camera
 from airlight.realtime.scene.mesh_adjacency import make_occluders
 from airlight.realtime.scene.read_scene import read_scene
-from airlight.validation.scenes.meshes import grid
-from tests.helpers.occluders import ALL
+from airlight.validation.scenes.meshes import grid, joined, placed, rotation
+from tests.helpers.occluders import ALL, closed_sphere
 from tests.helpers.scenes import tiny_scene
 
 LIGHTS = {"aside": (2.9, -1.7, 2.3), "near": (0.31, 0.47, 0.71), "inside": (0.11, -0.05, 0.17)}
@@ -105,6 +107,59 @@ def test_any_triangles_and_any_light(vertices, faces, light, seed):
     assume(len(occluders.triangles))
     assert_is_cycle(silhouette(occluders, np.array(light, dtype=float)))
     assert_counts_layers(occluders, light, seed=seed, count=4)
+
+
+def heap_of_balls():
+    """Return many balls that touch and run into one another, one component each."""
+    ways = random_directions(7, 9)
+    return joined([placed(closed_sphere(1), 0.5 * way, rotation((1, 0.3, 0.2), 40.0)) for way in ways])
+
+
+SUMMED = {
+    "heap of balls": heap_of_balls,
+    "open strip": ALL["open grid"],
+    "four-fold edge": ALL["boxes sharing an edge"],
+    "Moebius strip": ALL["Moebius strip"],
+    "mixed winding": ALL["mixed winding"],
+    "torus": ALL["torus"],
+}
+PLACES = {name: (*light, 1.0) for name, light in LIGHTS.items()} | {"sun": (0.3, -0.5, 0.8, 0.0)}
+
+
+@pytest.mark.claim("silhouettes-count-layers")
+@pytest.mark.parametrize("light", PLACES)
+@pytest.mark.parametrize("name", SUMMED)
+def test_a_coefficient_is_the_sum_over_the_triangles_at_an_edge(name, light):
+    """The definition, c_e = sum_t s_te w_t, summed edge by edge and triangle by triangle."""
+    occluders = occluders_of(SUMMED[name]())
+    place = np.array(PLACES[light])
+    expected: Counter = Counter()
+    for corners, component in zip(occluders.triangles.tolist(), occluders.component, strict=True):
+        a, b, c = occluders.vertices[corners]
+        front = int(np.sign(np.cross(b - a, c - a) @ (place[:3] - place[3] * a)))
+        weight = max(front, 0) if occluders.closed[component] else front
+        for tail, head in ((0, 1), (1, 2), (2, 0)):
+            edge = corners[tail], corners[head]
+            expected[min(edge), max(edge)] += weight if edge[0] < edge[1] else -weight
+    contour = silhouette(occluders, place)
+    summed = dict(zip(map(tuple, contour.edges.tolist()), contour.coefficient.tolist(), strict=True))
+    assert summed == {edge: value for edge, value in expected.items() if value}
+    assert summed or light == "inside"
+
+
+def test_edges_of_more_layers_than_a_plane_has_room_for_are_refused(variant):
+    """Pages of a book that meet at its spine: the light sees the fronts of all of them."""
+    angle = np.linspace(0.1, 0.4, 40)
+    pages = np.stack([np.cos(angle), np.sin(angle), np.zeros(40)], axis=1)
+    vertices = np.concatenate([[[0, 0, -0.5], [0, 0, 0.5]], pages])
+    faces = [(0, 1, 2 + page) for page in range(40)]
+    used = np.ones(1, dtype=bool)
+    light, camera = np.array([0.1, 3.0, 0.2]), np.array([3.0, 0.1, 0.4])
+    few, many = (make_occluders([("book", vertices, faces[:count])]) for count in (31, 40))
+    assert silhouette(few, light).coefficient.max() == 31
+    index_planes(few, light, camera, used=used, types=array_types("single"))
+    with pytest.raises(InputError, match=r"40 layers; expected .* of 31: use simpler occluders"):
+        index_planes(many, light, camera, used=used, types=array_types("single"))
 
 
 # Layers between light and camera -------------------------------------------------------------------------------------
