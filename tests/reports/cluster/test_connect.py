@@ -45,7 +45,7 @@ def test_where_no_scheduler_answers(monkeypatch):
 def _dask(*words, root=ROOT):
     return subprocess.Popen(
         [sys.executable, "-m", "dask", *words],
-        env=os.environ | {"PYTHONPATH": str(root)},
+        env=os.environ | {"PYTHONPATH": f"{root}{os.pathsep}{root / 'src'}"},  # its tests, and its package
         cwd=root,  # which stands first among the places of modules
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -88,6 +88,7 @@ def other_version(tmp_path):
     other = tmp_path / "other"
     for name in ("analytic", "realtime", "reference", "validation", "reports", "tests"):
         shutil.copytree(ROOT / name, other / name, ignore=shutil.ignore_patterns("__pycache__", "data"))
+    shutil.copytree(ROOT / "src" / "airlight", other / "src" / "airlight", symlinks=True)
     changed = other / "realtime" / "scene" / "read_scene.py"
     changed.write_text(changed.read_text() + "\nOTHER_VERSION = True\n")
     return other
