@@ -83,13 +83,14 @@ def values(parameters: Parameters) -> dict[str, Any]:
 
 
 def read_parameters(
-    method: str, kind: type[Parameters], given: Mapping[str, Any], *, others: Iterable[str] = ()
+    method: str, kind: type[Parameters], given: Mapping[str, Any], *, others: Iterable[str] = (), see: str = ""
 ) -> Any:
     """Return the parameters of a method from values or words, the others with their defaults.
 
     `method`: its name, for messages; `kind`: the class of its parameters; `given`: values by name; a word is converted
-    to the type of the default; `others`: names that are known elsewhere, for messages. Raises InputError for an unknown
-    name (the nearest is named), a value of the wrong type, and what `Parameters` refuses.
+    to the type of the default; `others`: names that are known elsewhere, and `see`: a method that has more, for
+    messages. Raises InputError for an unknown name (the nearest is named), a value of the wrong type, and what
+    `Parameters` refuses.
     """
     known = defaults(kind)
     converted = {}
@@ -97,9 +98,8 @@ def read_parameters(
         if name not in known:
             names = [*known, *others]
             wanted = ", ".join(names) or "none"
-            raise InputError(
-                f"method {method}: got a parameter {name!r}, expected one of: {wanted}{nearest(name, names)}"
-            )
+            more = nearest(name, names) or (see and f"; for what its paper does, see {see}")
+            raise InputError(f"method {method}: got a parameter {name!r}, expected one of: {wanted}{more}")
         converted[name] = _converted(f"method {method}: {name}", value, known[name])
     return kind(**converted)
 

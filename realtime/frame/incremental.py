@@ -12,7 +12,7 @@ Surface and airlight are computed for every frame. The caller says what moved: n
 without being named stays where it was.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +20,6 @@ from airlight.realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
     give_memory_back,
-    light_groups,
     parts,
     run_cast_and_shade,
     run_method,
@@ -95,33 +94,15 @@ def _next_of(
     renderer = replace(renderer, frame=renderer.frame + frames)
     geometry_moved |= light_moved and any(light.opaque for light in renderer.scene.area_lights)
     moved = {"camera": camera_moved, "geometry": geometry_moved, "light": light_moved, "look": True}
-    finish: Callable[[], Any] | None = None
     if state is None:
-        if cache is None or cache.state is None or any(moved[what] for what in renderer.method.prepared_from):
-            finish = _started(renderer)
-        else:
-            state = cache.state
+        state = cache.state if cache else None
+        if state is None or any(moved[what] for what in renderer.method.prepared_from):
+            state = renderer.prepare(renderer.scene)
     cast = cache.cast if cache else None
     if camera_moved or geometry_moved:
         cast, by_light = run_cast_and_shade(renderer)
     else:
         cast = run_cast_and_shade(renderer)[0] if cast is None else cast
         by_light = run_shade(renderer, cast)
-    if finish is not None:
-        state = finish()
     rendered = run_method(renderer, state, cast, by_light, cache.carried if cache else None)
     return evaluated(cast, rendered), FrameCache(cast, state, rendered.carried, rendered.extra, frames + 1)
-
-
-def _started(renderer: FrameRenderer) -> Callable[[], Any]:
-    """Return a function that finishes the preparation.
-
-    One that works on the host has a method `start`: it reads what it needs of the scene, for which the device must have
-    come to rest, and returns the rest of the work, which is done while the device is busy with the surface.
-    """
-    groups = light_groups(renderer)
-    if len(groups) > 1 or not hasattr(groups[0].stages.prepare, "start"):
-        prepared = renderer.prepare(renderer.scene)
-        return lambda: prepared
-    finish = groups[0].stages.prepare.start(groups[0].scene)
-    return lambda: (finish(),)

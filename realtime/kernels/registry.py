@@ -18,14 +18,13 @@ inputs. A kernel that reads tables has a `prepare`; code that freezes a function
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 from airlight.realtime.kernels.closed_form import closed_form
 from airlight.realtime.kernels.exact import exact
 from airlight.realtime.kernels.stepping import equiangular, quadrature, quadrature_theta, uniform
 from airlight.realtime.kernels.table import table, upload_table
-from airlight.realtime.kernels.taylor import taylor, taylor_bounded
+from airlight.realtime.kernels.taylor import taylor, taylor_printed
 
 
 @dataclass(frozen=True)
@@ -41,9 +40,6 @@ class Kernel:
     in_asinh: bool = False  #: whether its nodes lie in w = asinh(q/h), by which media of any density can integrate
     #: ``prepare(Float, **parameters) -> tables``, which the function then takes as its keyword `tables`
     prepare: Callable[..., Any] | None = None
-    #: ``bounded(geometry, x0, x1, light, phase, segment, **parameters) -> J [1/m]``, its form for bounded media:
-    #: `segment` is a `realtime.scene.media.published_form.ConstantLeg`, x0 and x1 bound a segment of any length [m]
-    bounded: Callable[..., Any] | None = None
     tables: Any = None  #: on the device
 
     def __call__(self, *arguments):
@@ -60,11 +56,6 @@ class Kernel:
             For what the kernel's `prepare` refuses.
         """
         return self if self.prepare is None else replace(self, tables=self.prepare(Float, **self.parameters))
-
-    @property
-    def bounded_form(self) -> Callable[..., Any] | None:
-        """The form for bounded media with the kernel's parameters; None for a kernel that has none."""
-        return None if self.bounded is None else partial(self.bounded, **self.parameters)
 
     @property
     def asinh_nodes(self) -> int | None:
@@ -99,15 +90,13 @@ KERNELS: dict[str, Kernel] = {
         "polynomial in the angle theta about the foot, coefficients re-derived",
         "Biri, Arques, Michelin 2006, section 4.1 and annex",
         {"degree": 4},
-        bounded=taylor_bounded,
     ),
     "taylor-printed": Kernel(
         "taylor-printed",
-        partial(taylor, printed=True),
+        taylor_printed,
         "the same with the paper's coefficients as printed, misprints included",
         "Biri, Arques, Michelin 2006, annex as transcribed",
         {"degree": 4},
-        bounded=partial(taylor_bounded, printed=True),
     ),
     "quadrature-theta": Kernel(
         "quadrature-theta",

@@ -48,73 +48,51 @@ from airlight.realtime.numerics.array_types import largest
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Homogeneous
-from airlight.realtime.scene.media.published_form import ConstantLeg, tangent_series
 from airlight.realtime.scene.phase import PHASES, Phase, series_product
 
 PRINTED_PHASES = ("isotropic", "rayleigh", "hazy", "murky")
 HIGHEST_DEGREE = 4
 
 
-def taylor_bounded(
-    geometry: RayGeometry,
-    x0,
-    x1,
-    light: Light,
-    phase: Phase,
-    segment: ConstantLeg,
-    *,
-    degree: int = 4,
-    printed: bool = False,
-):
-    """Return the airlight integral of a bounded medium by the polynomial (`realtime.scene.media.published_form`) [1/m].
-
-    Valid near theta = 0, as `taylor`, and as far as a constant stands for the light's way in the medium. The paper
-    prints no coefficients for the derived exponent.
-    """
-    if segment.printed:
-        coefficients = _coefficients(segment.sigma_t * segment.distance, phase, degree, printed=printed)
-    elif printed:
-        raise InputError(
-            "kernel taylor-printed: the paper prints no coefficients for the exponent that section 4.2 must mean; use "
-            "media=printed, or the kernel 'taylor'"
-        )
-    else:
-        _check_degree(degree)
-        series = tangent_series(segment.sigma_t * geometry.height, degree)
-        coefficients = series_product(series, _phase_series(phase, degree, "taylor"), degree)
-    depth = dr.fma(segment.sigma_t, geometry.foot, segment.depth)
-    if segment.printed:
-        depth = dr.fma(segment.sigma_t, segment.distance, depth)  # e^-b, which the coefficients leave out
-    return _polynomial(geometry, x0, x1, light, coefficients) * dr.exp(-depth) / geometry.height
-
-
-def taylor(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4, printed: bool = False):
+def taylor(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4):
     """Return the airlight integral J by the Taylor polynomial about the foot [1/m].
 
-    `degree`: degree of the polynomial, 4 in the paper; at most 4 as printed, where with 2 every coefficient is a
-    printed one; `printed`: whether the coefficients are those of the paper's annex, misprints included: the kernel
-    `taylor-printed`. Raises InputError for a phase function that has no series, or that the annex does not have, and
-    for a degree that there is not.
+    `degree`: of the polynomial, 4 in the paper. Raises InputError for a phase function that has no series, and for a
+    degree below 0.
 
     Valid near theta = 0 only: the error is large where the segment ends more than about 1 rad from the foot or where
     sigma_t h is large; far behind the camera exp(-sigma_t foot) overflows. That is the published method's own limit.
-    As printed it is valid nowhere in particular: even near the foot the error is of first order in theta (hazy, murky)
-    or of second (isotropic, Rayleigh).
     """
+    return _by_extinction(geometry, x0, x1, medium, light, degree=degree, printed=False)
+
+
+def taylor_printed(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int = 4):
+    """Return J by the polynomial with the coefficients of the paper's annex, misprints included [1/m].
+
+    `degree`: at most 4; with 2 every coefficient is a printed one. Raises InputError for a phase function that the
+    annex does not have, and for a degree beyond.
+
+    Valid nowhere in particular: even near the foot the error is of first order in theta (hazy, murky) or of second
+    (isotropic, Rayleigh).
+    """
+    return _by_extinction(geometry, x0, x1, medium, light, degree=degree, printed=True)
+
+
+def _by_extinction(geometry: RayGeometry, x0, x1, medium: Homogeneous, light: Light, *, degree: int, printed: bool):
     h = geometry.height
 
     def integral(sigma_t):
         a = sigma_t * h
-        coefficients = _coefficients(a, medium.phase, degree, printed=printed)
-        total = _polynomial(geometry, x0, x1, light, coefficients)
+        coefficients = coefficients_of(a, medium.phase, degree, printed=printed)
+        total = integral_of(geometry, x0, x1, light, coefficients)
         return total * dr.exp(-sigma_t * geometry.foot - a) / h
 
     return medium.per_extinction(integral)
 
 
-def _coefficients(a, phase: Phase, degree: int, *, printed: bool) -> list:
+def coefficients_of(a, phase: Phase, degree: int, *, printed: bool) -> list:
     """Return c_0 to c_N without e^-a; as printed, those that the annex does not have are the derived ones."""
-    _check_degree(degree)
+    check_degree(degree)
     name = phase.name
     if printed and name not in PRINTED_PHASES:
         raise InputError(
@@ -123,7 +101,7 @@ def _coefficients(a, phase: Phase, degree: int, *, printed: bool) -> list:
         )
     if printed and degree > HIGHEST_DEGREE:
         raise InputError(f"degree: got {degree}, expected 0 to {HIGHEST_DEGREE}; for more use the kernel 'taylor'")
-    series = _phase_series(phase, degree, "taylor-printed" if printed else "taylor")
+    series = phase_series(phase, degree, "taylor-printed" if printed else "taylor")
     derived = series_product(_extinction_series(a, degree), series, degree)
     if not printed:
         return derived
@@ -162,7 +140,7 @@ def printed_coefficients(a, name: str) -> list:
     ]
 
 
-def _polynomial(geometry: RayGeometry, x0, x1, light: Light, coefficients):
+def integral_of(geometry: RayGeometry, x0, x1, light: Light, coefficients):
     """Return the integral of a polynomial in theta over a segment [1]."""
     s0, s1 = x0 - geometry.foot, dr.minimum(x1 - geometry.foot, largest(type(geometry.height)))
     angles = dr.atan2(s0, geometry.height), dr.atan2(s1, geometry.height)
@@ -171,7 +149,8 @@ def _polynomial(geometry: RayGeometry, x0, x1, light: Light, coefficients):
     return _integrated(geometry, (s0, s1), angles, coefficients)
 
 
-def _check_degree(degree: int) -> None:
+def check_degree(degree: int) -> None:
+    """Refuse a degree below 0."""
     if degree < 0:
         raise InputError(f"degree: got {degree}, expected 0 or more")
 
@@ -214,7 +193,7 @@ def _extinction_series(a, degree: int):
     return e
 
 
-def _phase_series(phase: Phase, degree: int, kernel: str):
+def phase_series(phase: Phase, degree: int, kernel: str):
     """Return the coefficients of p(-sin theta) in powers of theta; refuse a phase function without them."""
     series = phase.series(degree)
     if series is None:

@@ -1,66 +1,96 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Real-time methods by name.
 
-`METHODS` is the registry: add a class to it and every command and report knows it. `find_method` also finds a user's
-own, which is not in it.
+`METHODS` is the registry: add a class to it and every command and report knows it. `find_method` also
+finds a user's own, which is not in it. A class is loaded when it is asked for: a frame of fog loads
+neither clouds nor shaders.
 """
 
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+
 from airlight.realtime.errors import InputError
-from airlight.realtime.methods.cloud_collectors import CloudCollectors
-from airlight.realtime.methods.cloud_octaves import CloudOctaves
-from airlight.realtime.methods.epipolar.method import MinMax
-from airlight.realtime.methods.equi_angular import EquiAngular
-from airlight.realtime.methods.froxel_fog.method import FroxelFog
 from airlight.realtime.methods.history import ENDING, with_history
 from airlight.realtime.methods.interface.method import Method
-from airlight.realtime.methods.light_volumes.method import LightVolumes
-from airlight.realtime.methods.ray_march import RayMarch
-from airlight.realtime.methods.shader.method import shader_method
-from airlight.realtime.methods.shader.source import is_shader
-from airlight.realtime.methods.shadow_planes.method import ShadowPlanes
-from airlight.realtime.methods.soft_shafts.method import SoftShafts
-from airlight.realtime.methods.unshadowed import Unshadowed
-from airlight.realtime.methods.user_method import user_method
 from airlight.realtime.parameters import nearest
 
-_ALL = (
-    Unshadowed,
-    RayMarch,
-    EquiAngular,
-    ShadowPlanes,
-    LightVolumes,
-    MinMax,
-    FroxelFog,
-    SoftShafts,
-    CloudOctaves,
-    CloudCollectors,
-)
-
-METHODS: dict[str, type[Method]] = {method.name: method for method in _ALL}
-
-#: Those of light that is scattered once, in any scene, without random numbers by default; the others are for clouds.
-FOG_METHODS: dict[str, type[Method]] = {
-    name: method for name, method in METHODS.items() if not (method.renders_clouds or method().noisy)
+#: By name, the module in this room and the class.
+_CLASSES: Mapping[str, str] = {
+    "unshadowed": "unshadowed:Unshadowed",
+    "ray-march": "ray_march:RayMarch",
+    "equi-angular": "equi_angular:EquiAngular",
+    "shadow-planes": "shadow_planes.method:ShadowPlanes",
+    "light-volumes": "light_volumes.method:LightVolumes",
+    "min-max": "epipolar.method:MinMax",
+    "froxel-fog": "froxel_fog.method:FroxelFog",
+    "soft-shafts": "soft_shafts.method:SoftShafts",
+    "shadow-planes-2006": "published.biri2006.method:ShadowPlanes2006",
+    "light-volumes-2010": "published.billeter2010.method:LightVolumes2010",
+    "cloud-octaves": "cloud_octaves:CloudOctaves",
+    "cloud-collectors": "cloud_collectors:CloudCollectors",
 }
+
+#: Those of light that is scattered once, in any scene, without random numbers by default.
+FOG_METHODS = (
+    "unshadowed",
+    "ray-march",
+    "shadow-planes",
+    "light-volumes",
+    "min-max",
+    "froxel-fog",
+    "soft-shafts",
+)
+#: Those that have the errors of a paper, to judge it.
+PUBLISHED_METHODS = ("shadow-planes-2006", "light-volumes-2010")
+
+
+class _Methods(Mapping[str, type[Method]]):
+    def __getitem__(self, name: str) -> type[Method]:
+        module, _, found = _CLASSES[name].partition(":")
+        method: type[Method] = getattr(import_module(f"airlight.realtime.methods.{module}"), found)
+        return method
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_CLASSES)
+
+    def __len__(self) -> int:
+        return len(_CLASSES)
+
+
+METHODS: Mapping[str, type[Method]] = _Methods()
 
 
 def find_method(name: str) -> type[Method]:
     """Return a method.
 
-    `name`: a name of `METHODS`, or a user's own: 'module:function', 'path/to/file.py:function'
-    (`realtime.methods.user_method`), 'path/to/file.glsl' (`realtime.methods.shader`); with '+history' behind it,
-    averaged over frames. Raises InputError for an unknown name (the nearest is named), and for what cannot be imported
-    or is no method.
+    Parameters
+    ----------
+    name
+        A name of `METHODS`, or a user's own: 'module:function', 'path/to/file.py:function'
+        (`realtime.methods.user_method`), 'path/to/file.glsl' (`realtime.methods.shader`); with
+        '+history' behind it, averaged over frames.
+
+    Raises
+    ------
+    InputError
+        For an unknown name (the nearest is named), and for what cannot be imported or is no method.
     """
+    # What few frames need is imported where it is.
+    if name in METHODS:
+        return METHODS[name]
+    from airlight.realtime.methods.shader.source import is_shader
+
     if name.endswith(ENDING):
         if is_shader(own := name.removesuffix(ENDING)):
             raise InputError(f"method {name}: a shader keeps its own frames; expected its name without '{ENDING}'")
         return with_history(find_method(own))
-    if name in METHODS:
-        return METHODS[name]
     if is_shader(name):
+        from airlight.realtime.methods.shader.method import shader_method
+
         return shader_method(name)
     if ":" in name:
+        from airlight.realtime.methods.user_method import user_method
+
         return user_method(name)
     raise InputError(
         f"method: got {name!r}, expected one of {', '.join(METHODS)}, 'module:function', or a shader, 'fog.glsl'"

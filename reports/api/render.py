@@ -404,10 +404,10 @@ def _warnings(renderer: Any) -> tuple[str, ...]:
     """Return the faults of planes in the order of a paper, and print them on the error stream."""
     import sys
 
-    from airlight.realtime.methods.shadow_planes.method import PlanePreparation
+    from airlight.realtime.methods.published.biri2006.method import PaperPreparation
 
     preparation = renderer.stages.prepare
-    warnings: tuple[str, ...] = preparation.warnings if isinstance(preparation, PlanePreparation) else ()
+    warnings: tuple[str, ...] = preparation.warnings if isinstance(preparation, PaperPreparation) else ()
     for warning in warnings:
         print(f"airlight: warning: {warning}", file=sys.stderr)
     return warnings
@@ -433,7 +433,6 @@ def asked_configurations(
     configurations; 'all', the default, for `usual`, or those of every built-in method for fog. Every method is measured
     with each kernel and with all settings, given by name or as NAME=VALUE; kernel=NAME is one more kernel.
     """
-    from airlight.realtime.methods.registry import FOG_METHODS
     from airlight.realtime.methods.shader.source import is_users
     from airlight.validation.study.configuration import (
         Configuration,
@@ -455,7 +454,7 @@ def asked_configurations(
         if method == "all":
             if option:
                 raise InputError(f"{option}: got no single method that it is for; name methods by --method")
-            chosen += chosen_configurations(list(FOG_METHODS)) if usual is None else usual
+            chosen += chosen_configurations() if usual is None else usual
         elif isinstance(method, Configuration):
             chosen.append(method)
         elif not isinstance(method, str):

@@ -42,6 +42,8 @@ _METHODS = {
     "equi-angular": ("vermillion", "8"),
     "shadow-planes": ("blue", "^"),
     "light-volumes": ("green", "D"),
+    "shadow-planes-2006": ("blue", "<"),
+    "light-volumes-2010": ("green", "d"),
     "min-max": ("purple", "v"),
     "froxel-fog": ("orange", "h"),
     "soft-shafts": ("navy", "p"),

@@ -11,7 +11,8 @@ from tests.helpers.frames import read, render
 from tests.helpers.scenes import spot, tiny_scene
 
 SIZE = (48, 36)
-EVALUATIONS = ("walk", "mesh")
+#: The same height field walked and drawn, by methods and their parameters.
+VOLUMES = {"light-volumes": {"walls": "slanted"}, "light-volumes-2010": {}}
 
 
 def lamp(*position):
@@ -72,9 +73,8 @@ def loaded_scene(name="light beside the view", **changes):
 
 
 def render_both(loaded, precision="single", **parameters):
-    """Render the same height field, as published, by both evaluations."""
-    shared = {"precision": precision, "walls": "slanted"} | parameters
-    return [render(loaded, "light-volumes", evaluation=evaluation, **shared) for evaluation in EVALUATIONS]
+    """Render the same height field, as published, by both methods."""
+    return [render(loaded, method, precision=precision, **own, **parameters) for method, own in VOLUMES.items()]
 
 
 def differ(image, expected):

@@ -24,6 +24,9 @@ from airlight.validation.study.frame_times import moved_light
 _COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these references [pixels]
 _SECONDS = 0.1  # for each timing [s]
 
+#: What the paper has at once, beside its polynomial and the cone of a spot.
+AS_PUBLISHED: Mapping[str, Any] = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "media": "paper"}
+
 #: By the name of its figures a scene that stands for one of the paper, its size [pixels], and the edges of the paper's
 #: cone over the spot, 0 where there is none.
 ENTRIES: Mapping[str, tuple[str, tuple[int, int], int]] = {
@@ -50,9 +53,8 @@ def biri_tables(*, scale: float = 1.0, seconds: float = _SECONDS) -> dict[str, A
         resize(loaded, compared)
         reference = reference_image(loaded)
         whole = reference.airlight + reference.surface
-        values = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "cone": cone}
-        values["white"] = float(np.quantile(whole.max(axis=-1), 0.999))
-        chosen = configuration("shadow-planes", "taylor", values)
+        white = float(np.quantile(whole.max(axis=-1), 0.999))
+        chosen = configuration("shadow-planes-2006", "taylor", {**AS_PUBLISHED, "cone": cone, "white": white})
         frame = render_frame(prepared(read_scene(loaded), chosen))
         errors.append(known(error_metrics(whole, frame.airlight + frame.surface).p50))
         forms = chosen, configuration("shadow-planes", "exact")

@@ -10,15 +10,13 @@ everywhere, so the fractions are those of moderate rays, which scenes are made o
 distance of the light, angle to the light 1 to 179 degrees, length 0.05 to 10 distances.
 """
 
-from functools import partial
-
 import numpy as np
 from scipy.integrate import quad
 
 from airlight.analytic.droplets import Modified, optics
 from airlight.analytic.phase import PhaseFunction
 from airlight.analytic.series import taylor_coefficients
-from airlight.realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor
+from airlight.realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor, taylor_printed
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.kernels.case_files import Cases
 from airlight.validation.kernels.cases import evaluate_cases, relative_error
@@ -91,7 +89,7 @@ def _annex() -> dict[str, float]:
 def _within_ten_percent() -> dict[str, float]:
     """Return the fraction of moderate rays on which the isotropic polynomials are within 10 %."""
     cases, found = wide_rays(_WIDE_RAYS), {}
-    for name, kernel in (("printed", partial(taylor, printed=True)), ("derived", taylor)):
+    for name, kernel in (("printed", taylor_printed), ("derived", taylor)):
         error = relative_error(evaluate_cases(cases, kernel, "double"), np.asarray(cases.value), "double")
         found[f"within 10 %, {name}"] = float(np.mean(error[_moderate(cases)] <= 0.1))
     return found

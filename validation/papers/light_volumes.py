@@ -2,7 +2,7 @@
 """Sections 4 to 6 of Billeter 2010: the mesh of a light volume, its adaptive tessellation, its depths, its map.
 
 *Plain Laplacian.* The paper finds edges by a Laplacian filter of the shadow map; ours takes the terms of the Laplacian
-of the inverse depth one by one, at the spacing of every level (`realtime.methods.light_volumes.published.
+of the inverse depth one by one, at the spacing of every level (`realtime.methods.published.billeter2010.
 tessellation`). Here the plain filter, of the depth at the texels alone, stands beside it: its threshold is chosen so
 that both meshes have as many triangles, and both are compared with the static mesh of the same map.
 
@@ -33,9 +33,9 @@ from airlight.realtime.frame.renderer import (
     run_cast_and_shade,
     run_method,
 )
-from airlight.realtime.methods.light_volumes.published.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
-from airlight.realtime.methods.light_volumes.published.raster import signed_crossings
-from airlight.realtime.methods.light_volumes.published.tessellation import divide, edges, quads, triangles
+from airlight.realtime.methods.published.billeter2010.mesh import THRESHOLD, VolumeMesh, adaptive_mesh, volume_mesh
+from airlight.realtime.methods.published.billeter2010.raster import signed_crossings
+from airlight.realtime.methods.published.billeter2010.tessellation import divide, edges, quads, triangles
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map, inverse_depth
@@ -59,6 +59,7 @@ _BIAS_MAP, _BIAS_SIZE = 128, (64, 64)  # of omni-box
 _MAPS = (32, 128, 512)  # of Fig. 6 [texels]
 FACETS = {"few": 16, "many": 512}  #: of a ring of the sphere: 514 triangles, and half a million
 _TRIANGLE_SIZE = (512, 512)
+_MESH = "light-volumes-2010"
 _SECONDS = 0.3  # for each timing [s]
 _HALVINGS = 24  # of the interval of the threshold
 
@@ -67,15 +68,13 @@ def maps() -> dict[str, float]:
     """Return the errors of the mesh in `omni-box` by size of the map, and of the image of 128 texels to that of 512."""
     loaded = load_scene("omni-box", SIZE).scene
     scene, true = read_scene(loaded), reference_image(loaded).airlight
-    images = {size: render_frame(_renderer(scene, "mesh", size)).airlight for size in _MAPS}
+    images = {size: render_frame(_renderer(scene, _MESH, size)).airlight for size in _MAPS}
     errors = {str(size): known(error_metrics(true, image).relative_rmse) for size, image in images.items()}
     return errors | {"128 to 512": known(error_metrics(images[512], images[128]).relative_rmse)}
 
 
-def _renderer(scene: Scene, evaluation: str, size: int) -> FrameRenderer:
-    walls = {"walls": "slanted"} if evaluation == "walk" else {}
-    chosen = methods.configuration("light-volumes", "exact", {"evaluation": evaluation, "map": size, **walls})
-    return methods.prepared(scene, chosen)
+def _renderer(scene: Scene, method: str, size: int, **values: str) -> FrameRenderer:
+    return methods.prepared(scene, methods.configuration(method, "exact", {"map": size, **values}))
 
 
 def triangle_times() -> dict[str, Any]:
@@ -83,7 +82,7 @@ def triangle_times() -> dict[str, Any]:
     times: dict[str, Any] = {}
     for name, facets in FACETS.items():
         scene = _sphere(facets)
-        volumes = _renderer(scene, "walk", MAP)
+        volumes = _renderer(scene, "light-volumes", MAP, walls="slanted")
         state = volumes.prepare(scene)
         cast, by_light = run_cast_and_shade(volumes)
         dr.eval(cast, by_light)
@@ -129,7 +128,7 @@ def tessellation() -> dict[str, Any]:
         "jump": float(np.median(side[jump])),
         "best bias": min(errors.values()),
         **errors,
-        **_filter_errors(_renderer(scene, "mesh", MAP), shadow_map, heights, divided),
+        **_filter_errors(_renderer(scene, _MESH, MAP), shadow_map, heights, divided),
     }
 
 
@@ -221,7 +220,7 @@ def _biased() -> list[float]:
     loaded = load_scene("omni-box", _BIAS_SIZE).scene
     scene = read_scene(loaded)
     light = scene.lights[0]
-    depth = render_frame(_renderer(scene, "mesh", _BIAS_MAP)).distance.astype(np.float64).ravel()
+    depth = render_frame(_renderer(scene, _MESH, _BIAS_MAP)).distance.astype(np.float64).ravel()
     mesh = volume_mesh(cast_shadow_map(scene.geometry, light, _BIAS_MAP), light)
     sum_of = partial(crossings_sum, loaded, depth)
     clamped = sum_of(mesh, clamp=True)

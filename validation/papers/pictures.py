@@ -12,8 +12,8 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.realtime.frame.renderer import render_frame
-from airlight.realtime.methods.light_volumes.published.mesh import THRESHOLD
-from airlight.realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
+from airlight.realtime.methods.published.billeter2010.mesh import THRESHOLD
+from airlight.realtime.methods.published.billeter2010.tessellation import divide, edges, triangles
 from airlight.realtime.scene.animate import thicker_medium
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map

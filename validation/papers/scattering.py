@@ -87,7 +87,7 @@ def _multiple(scene: Any, seed: int) -> Array:
 def _ambient(scene: Scene) -> Array:
     """Return the ambient fog of constant 1, (pixels, 3), as the method draws it."""
     lit, unlit = (
-        render_frame(prepared(scene, configuration("shadow-planes", "exact", values))).airlight.astype(np.float64)
+        render_frame(prepared(scene, configuration("shadow-planes-2006", "exact", values))).airlight.astype(np.float64)
         for values in ({"ambient": 1.0}, {})
     )
     return (lit - unlit).reshape(-1, 3)
@@ -133,4 +133,4 @@ def sphere_in_vacuum(size: float, optical_depth: float, image: tuple[int, int]) 
 
 
 def _airlight(scene: Scene, media: str, kernel: str = "exact") -> Array:
-    return render_frame(prepared(scene, configuration("shadow-planes", kernel, {"media": media}))).airlight
+    return render_frame(prepared(scene, configuration("shadow-planes-2006", kernel, {"media": media}))).airlight

@@ -62,10 +62,10 @@ def shortcuts() -> dict[str, float]:
     brightest = float(np.percentile(true.max(axis=2), 99))
     biases = {}
     for name, white in (("bright", brightest / 4), ("dim", 4 * brightest)):
-        image = _rendered(scene, buffer="8bit", white=white)
+        image = _rendered(scene, order="exact", buffer="8bit", white=white)
         below = true < white
         biases[f"{name}, bias"] = float((image - true)[below].sum() / true[below].sum())
-    vertex = _error(*_opened("two-pens"), evaluation="vertex")
+    vertex = _error(*_opened("two-pens"), order="exact", evaluation="vertex")
     return {"near, steps": _steps(), "vertex": known(vertex.relative_rmse), **biases}
 
 
@@ -106,7 +106,7 @@ def _opened(name: str) -> tuple[Scene, Array]:
     return read_scene(loaded), reference_image(loaded).airlight
 
 
-def _rendered(scene: Scene, method: str = "shadow-planes", kernel: str = "exact", **values: Any) -> Array:
+def _rendered(scene: Scene, method: str = "shadow-planes-2006", kernel: str = "exact", **values: Any) -> Array:
     frame = render_frame(prepared(scene, configuration(method, kernel, values)))
     return np.asarray(frame.airlight, dtype=np.float64)
 

@@ -97,10 +97,13 @@ def configuration(
     return Configuration(method, kernel, tuple((name, known[name]) for name in parameters or {}))
 
 
-def chosen_configurations(methods: Sequence[str]) -> tuple[Configuration, ...]:
-    """Return the standard configurations of some methods; one without any for every scene has its defaults too."""
+def chosen_configurations(methods: Sequence[str] | None = None) -> tuple[Configuration, ...]:
+    """Return the standard configurations of some methods, of all of them by default.
+
+    A method without any for every scene has its defaults too.
+    """
     chosen: list[Configuration] = []
-    for method in methods:
+    for method in dict.fromkeys(known.method for known in STANDARD) if methods is None else methods:
         default = configuration(method)
         standard = [known for known in STANDARD if known.method == method]
         everywhere = any("points" not in dict(known.parameters) for known in standard)

@@ -252,7 +252,7 @@ def _configurations(data: Mapping[str, Any]) -> tuple[Configuration, ...]:
     asked = data.get("methods", "all")
     if isinstance(asked, str):
         read_one_of("methods", asked, names=_METHOD_SETS)
-        sets = {"all": default_configurations, "standard": lambda: chosen_configurations(list(FOG_METHODS))}
+        sets = {"all": default_configurations, "standard": chosen_configurations}
         standard = sets[asked]() if asked in sets else named_configurations(asked)
         if not (parameters or "kernels" in data or "maps" in data):
             return standard

@@ -123,17 +123,15 @@ class View(Rays):
         """Return where the rays pass a light: foot, height, and what of them it could reach."""
         return ray_geometry(self.origin, self.aim, light)
 
-    def lit_by(self, light: Light, kernel: Any = None, *, form: str = "kernel") -> LitRays:
+    def lit_by(self, light: Light, kernel: Any = None) -> LitRays:
         """Return the rays with one light, which the medium integrates.
 
         Parameters
         ----------
         light, kernel
             One of `lights`, and an airlight kernel, or None where no integral is asked for.
-        form
-            In bounded media, see `realtime.scene.media.bounded.BoundedMedia.lit`.
         """
-        return self.medium.lit(self, light, self.geometry(light), kernel=kernel, form=form)
+        return self.medium.lit(self, light, self.geometry(light), kernel)
 
     def of_pixels(self, pixel: PerRay, distance: Metres) -> "View":
         """Return the view of other pixels of the image; `distance` [m] is that to their visible surfaces."""
@@ -186,6 +184,7 @@ class Method(Parameters):
     name: ClassVar[str] = ""
     summary: ClassVar[str] = "a user method"  #: what it does, for tables
     source: ClassVar[str] = "the user"  #: the paper
+    as_published: ClassVar[str] = ""  #: the method that does what the paper does
     shadows: ClassVar[bool] = True  #: whether it knows shadows; one that does not is wrong where there are occluders
     #: Whether it knows clouds of any shape and a sky. Then it says itself how the media attenuate the surfaces, and has
     #: `Layers.extra` by order of scattering.
@@ -306,6 +305,6 @@ def method_parameters(method: type[Method], given: Mapping[str, Any]) -> tuple[M
     common = [item.name for item in fields(LightSamples) if item.name not in defaults(method)]
     own = {name: value for name, value in given.items() if name not in common}
     asked = {name: value for name, value in given.items() if name in common}
-    chosen = read_parameters(method.name, method, own, others=common)
+    chosen = read_parameters(method.name, method, own, others=common, see=method.as_published)
     read = values(read_parameters(method.name, LightSamples, asked))
     return chosen, replace(method.light_samples, **{name: read[name] for name in asked})

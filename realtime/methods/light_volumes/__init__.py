@@ -2,8 +2,7 @@
 """Light volumes: what a light reaches, bounded by the height field of its shadow map, crossed without marching.
 
 A ray is a straight line over each face of the map. It descends into a pyramid of heights to the texels over which it
-crosses the height field, and adds up the lit intervals between them. `published/` draws the volume as a mesh instead,
-as in the paper.
+crosses the height field, and adds up the lit intervals between them.
 
 Read in this order:
 
@@ -13,5 +12,4 @@ Read in this order:
 - `texel_crossings.py`: where it crosses the height field over one texel.
 - `texel_walls.py`: the height field over a texel with upright walls.
 - `jump_search.py`: how rays from the light find those walls.
-- `published/`: the volume as a mesh.
 """

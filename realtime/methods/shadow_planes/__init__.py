@@ -7,10 +7,8 @@ wedge that it crosses.
 
 Read in this order:
 
-- `method.py`: the method, its parameters and what the paper does otherwise.
+- `method.py`: the method.
 - `silhouettes.py`: the edges of occluders that bound their shadows, and which occluders a view needs.
 - `plane_table.py`: planes as four numbers, by wedges of azimuth.
 - `sweep.py`: the lit intervals of a ray, along the planes of its list.
-- `published_crossings.py`: the sum of the paper, plane by plane with a stencil.
-- `published_mesh.py`: its Gamma at the vertices of meshes, also in bounded media, medium by medium.
 """

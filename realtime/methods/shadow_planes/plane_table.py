@@ -64,8 +64,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.realtime.errors import InputError
-from airlight.realtime.methods.shadow_planes.silhouettes import NEARNESS, Silhouette, is_outside, ring_edges, silhouette
-from airlight.realtime.numerics.array_types import four_numbers, is_single
+from airlight.realtime.methods.shadow_planes.silhouettes import Silhouette, silhouette
+from airlight.realtime.numerics.array_types import ArrayTypes, four_numbers, is_single
 from airlight.realtime.numerics.functions import TURN, host_diamond_angle, host_direction
 from airlight.realtime.scene.lights import place_and_weight
 from airlight.realtime.scene.mesh_adjacency import Occluders
@@ -93,8 +93,7 @@ class PlaneIndex:
     bounds: Any  #: the largest c of an entry and of those behind it in its wedge
     scale: Any  #: wedges in a unit of azimuth
     lines: Any  #: A, B, P [1/m], Q [1/m] of every plane, flat; w = 0: P, Q, A, B
-    spans: Any  #: first and last azimuth, layers gained when psi grows past it, Biri's cosine of every plane; flat
-    ends: Any  #: ends of the edge of every plane in the frame [m], six numbers each, flat
+    spans: Any  #: first and last azimuth of every plane, flat
     layers: Any  #: layers between the light and the camera
     w: int = 1  #: last coordinate of the light's homogeneous position
 
@@ -106,9 +105,8 @@ class Planes:
     lines: Array  #: (planes, 4)
     first: NDArray[np.float32]
     last: NDArray[np.float32]
-    gain: NDArray[np.int32]
-    ends: Array  #: of the edge [m], (planes, 6)
-    centre: Array  #: cosine between the axis and the middle of the edge, Biri section 5.1.4; w = 0: -c of the middle
+    gain: NDArray[np.int32]  #: layers gained when psi grows past it
+    edge: NDArray[np.int64]  #: number of the edge that it is made of
 
 
 @dataclass(frozen=True)
@@ -143,7 +141,10 @@ def shadow_planes(occluders: Occluders, edges: Silhouette, basis: LightBasis) ->
 
 
 def edge_planes(vertices: Array, coefficient: NDArray[np.int32], *, w: int = 1) -> Planes:
-    """Return the shadow planes of edges in the frame, ends (edges, 2, 3), with their coefficients."""
+    """Return the shadow planes of edges in the frame, ends (edges, 2, 3), with their coefficients.
+
+    Edges that are a point as the light sees them have none.
+    """
     a, b = vertices[:, 0], vertices[:, 1]
     azimuth = host_diamond_angle(vertices[..., 0].astype(np.float32), vertices[..., 1].astype(np.float32))
     turn = azimuth[:, 1] - azimuth[:, 0]
@@ -167,21 +168,23 @@ def edge_planes(vertices: Array, coefficient: NDArray[np.int32], *, w: int = 1) 
             ],
             axis=1,
         )
-    middle = 0.5 * (a + b)
-    if w:
-        centre = middle[:, 2] / np.maximum(np.linalg.norm(middle, axis=1), np.finfo(float).tiny)
-    else:
+    if not w:
         lines = lines[:, [2, 3, 0, 1]]
-        centre = -np.linalg.norm(middle[:, :2], axis=1)
-    kept = (first != last) & np.all(np.isfinite(lines), axis=1)
-    return _chosen(Planes(lines, first, last, gain, vertices.reshape(-1, 6), centre), kept)
+    spans_azimuths = (first != last) & np.all(np.isfinite(lines), axis=1)
+    return _chosen(Planes(lines, first, last, gain, np.arange(len(a))), spans_azimuths)
 
 
-def wedge_lists(planes: Planes, *, order: str) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Array, np.float32]:
+def wedge_lists(
+    planes: Planes, *, rank: Array | None = None
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32], Array, np.float32]:
     """Return first places, entries, bounds and scale of the wedges of planes, as of `PlaneIndex`, in NumPy.
 
-    `planes`: none across azimuth 0; `order`: 'paper': towards the camera by the cosine of the middle of the edge;
-    'exact' and 'none': as rays cross them.
+    Parameters
+    ----------
+    planes
+        The planes, none across azimuth 0.
+    rank
+        By plane: a list begins with the least; None: as rays in the middle of the wedge cross them.
 
     Raises
     ------
@@ -202,8 +205,7 @@ def wedge_lists(planes: Planes, *, order: str) -> tuple[NDArray[np.uint32], NDAr
     a, b = planes.lines[:, :2].T
     at_middle = [form[plane] * way[wedge] for form, way in zip((a, b), middles)]
     at_low, at_high = (a[plane] * borders[0][end] + b[plane] * borders[1][end] for end in (wedge, wedge + 1))
-    key = -planes.centre[plane] if order == "paper" else at_middle[0] + at_middle[1]
-    place = np.lexsort((-key, wedge))
+    place = np.lexsort((-(at_middle[0] + at_middle[1]) if rank is None else rank[plane], wedge))
     bound = np.maximum(at_low, at_high)
     cos_width = np.sum(borders[:, 1:] * borders[:, :-1], axis=0)
     bound = np.where(bound > 0, bound / cos_width[wedge], bound)
@@ -239,7 +241,7 @@ def _largest_behind(values: Array, start: NDArray[np.int64]) -> Array:
     return values[order[largest]]
 
 
-def _parted(planes: Planes) -> Planes:
+def parted(planes: Planes) -> Planes:
     """Part the planes that hold azimuth 0 in two, one that ends beyond 4 and one that begins below 0."""
     around = planes.first > planes.last
     if not around.any():
@@ -331,50 +333,66 @@ def _crosses(occluders: Occluders, number, line: tuple[Array, Array], reach: tup
 
 
 def index_planes(
-    occluders: Occluders,
-    light: Array,
-    camera: Array,
-    *,
-    used: NDArray[np.bool_],
-    types,
-    order: str = "exact",
-    ring: Array | None = None,
+    occluders: Occluders, light: Array, camera: Array, *, used: NDArray[np.bool_], types: ArrayTypes
 ) -> PlaneIndex:
     """Find the shadow planes of a light and put them into wedges for a camera.
 
-    `occluders`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,)
-    [m]; `camera`: position of the camera [m]; `used`: by component, whether its shadow can be seen; `types`: the array
-    types to use, see `realtime.numerics.array_types`; `order`: in which rays go over planes, see `wedge_lists`; `ring`:
-    of a spot whose cone is an occluder, see `realtime.methods.shadow_planes.silhouettes.cone_ring`.
+    Parameters
+    ----------
+    occluders
+        Triangles with their adjacency.
+    light
+        Homogeneous position of the light, (4,), or its place, (3,) [m].
+    camera
+        Position of the camera [m].
+    used
+        By component, whether its shadow can be seen.
+    types
+        The array types to use, see `realtime.numerics.array_types`.
     """
     basis = light_basis(light, camera)
-    axes = basis.axes
     layers = layers_between(occluders, light, basis, used=used)
     planes = shadow_planes(occluders, silhouette(occluders, light, used=used), basis)
-    if ring is not None:
-        edges = NEARNESS * basis.distance * ring_edges(ring) @ axes.T
-        planes = _joined(planes, edge_planes(edges, np.full(len(ring), -1, dtype=np.int32)))
-        layers += is_outside(ring, axes[2])
-    planes = _parted(planes)
-    start, entries, bounds, scale = wedge_lists(planes, order=order)
+    return plane_index(parted(planes), basis, layers=layers, types=types)
+
+
+def plane_index(
+    planes: Planes, basis: LightBasis, *, layers: int, types: ArrayTypes, rank: Array | None = None
+) -> PlaneIndex:
+    """Return planes in wedges on the device.
+
+    Parameters
+    ----------
+    planes, rank
+        See `wedge_lists`.
+    basis
+        The frame of the planes.
+    layers
+        Between the light and the camera.
+    types
+        The array types to use.
+    """
+    start, entries, bounds, scale = wedge_lists(planes, rank=rank)
     Float = types.scalar
-    real = np.float32 if is_single(Float) else np.float64
-    spans = np.stack([planes.first, planes.last, planes.gain, planes.centre], axis=1)
     index = PlaneIndex(
-        tuple(mi.Vector3d(*(float(c) for c in axis)) for axis in axes),
+        tuple(mi.Vector3d(*(float(c) for c in axis)) for axis in basis.axes),
         Float(basis.distance),
-        mi.UInt32(_padded(start)),
-        mi.UInt32(_padded(entries, 3)),
-        Float(_padded(bounds.astype(real), 3)),
+        mi.UInt32(padded(start)),
+        mi.UInt32(padded(entries, 3)),
+        table_of(Float, bounds, 3),
         Float(float(scale)),
-        Float(_padded(planes.lines.astype(real).ravel(), 5)),
-        Float(_padded(spans.astype(real).ravel(), 5)),
-        Float(_padded(planes.ends.astype(real).ravel(), 6)),
+        table_of(Float, planes.lines, 5),
+        table_of(Float, np.stack([planes.first, planes.last], axis=1), 7),
         Float(layers),
         basis.w,
     )
     dr.make_opaque(index)
     return index
+
+
+def table_of(Float: type, values: Array, multiple: int) -> Any:
+    """Return numbers on the device, flat, padded as by `padded`."""
+    return Float(padded(values.astype(np.float32 if is_single(Float) else np.float64).ravel(), multiple))
 
 
 def planes_of_rays(index: PlaneIndex, azimuth, way, ray_end):
@@ -413,7 +431,7 @@ def plane_crossing(index: PlaneIndex, number, way, active):
     return quotient, quotient < index.distance * dr.fma(p, x, q * y)
 
 
-def _padded(values, multiple: int = 1):
+def padded(values, multiple: int = 1):
     """Return an array with zeros up to a power of two times `multiple`, aligned to 64 bytes.
 
     A frozen function is recorded again where arrays that had one size have two or the other way round, and where the

@@ -26,11 +26,6 @@ the light: at infinity, the plane across its direction replaces the sphere of di
 
 Biri, Arques, Michelin 2006, section 5.1.1, for closed meshes.
 
-**A spot as an occluder**: the cone over a point light that the paper adds (its section 6, with 32 edges). Points
-outside the cone are in shadow, one layer deep. Its silhouette is a ring of edges about the axis, close to the light;
-the corners lie on the cone of the spot, so that the pyramid is inside it. As the light sees the ring it runs
-counter-clockwise, with no layer to its left and one to its right: every edge has the coefficient -1.
-
 **Culling.** The shadow volume of an occluder lies in its bounding box extruded away from the light at (l, w): all
 points c + s (w c - l), s >= 0, c in the box. That is convex, the hull of the corners c and of the directions w c - l.
 It misses the view if it lies wholly outside one of the five planes through the pinhole that bound what the camera sees
@@ -47,9 +42,6 @@ from airlight.realtime.scene.lights import place_and_weight
 from airlight.realtime.scene.mesh_adjacency import Occluders
 
 Array = NDArray[np.float64]
-
-#: Distance of the ring of a spot from the light over that of the camera: within it what passes is lit all around.
-NEARNESS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -94,32 +86,6 @@ def silhouette(occluders: Occluders, light: Array, *, used: NDArray[np.bool_] | 
     coefficient = occluders.incidence @ weight
     on_silhouette = np.flatnonzero(coefficient)
     return Silhouette(occluders.edges[on_silhouette], coefficient[on_silhouette])
-
-
-def cone_ring(axis: Array, cos_cutoff: float, sides: int) -> Array:
-    """Return unit vectors from a light through the corners of a ring on its cone, (sides, 3).
-
-    `axis`: of the spot, a unit vector; `cos_cutoff`: cosine of the half angle of the cone, in (0, 1); `sides`: edges of
-    the ring, 3 or more.
-    """
-    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    across /= np.linalg.norm(across)
-    above = np.cross(across, axis)  # looking along the axis, `across` is to the right of it
-    angle = 2 * np.pi * (np.arange(sides) + 0.5) / sides
-    sine = np.sqrt((1 - cos_cutoff) * (1 + cos_cutoff))
-    return cos_cutoff * axis + sine * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * above)
-
-
-def ring_edges(ring: Array) -> Array:
-    """Return the corners at both ends of every edge of a ring, (sides, 2, 3)."""
-    return np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
-
-
-def is_outside(ring: Array, direction: Array) -> bool:
-    """Return whether a direction from the light, (3,), of any length [1], is outside the pyramid of a ring, (n, 3)."""
-    # The axis is on the other side of every plane of the pyramid: seen along it the ring runs counter-clockwise.
-    normals = np.cross(ring, np.roll(ring, -1, axis=0))
-    return bool(np.any(normals @ direction > 0))
 
 
 def components_in_view(occluders: Occluders, camera: HostCamera, light: Array) -> NDArray[np.bool_]:

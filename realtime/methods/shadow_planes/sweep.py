@@ -64,13 +64,23 @@ class RayPlanes:
     count: Any  #: how many of them it may cross before its end
 
 
-def ray_planes(index: PlaneIndex, x, y, z, *, ray_end) -> RayPlanes:
-    """Return camera rays, unit directions (x, y, z) in the basis of a light, with the planes that concern them.
+def ray_planes(index: PlaneIndex, aim, distance) -> RayPlanes:
+    """Return camera rays in the frame of a light, with the planes that they may cross.
 
-    `ray_end` is the quotient D/x at the end of each.
+    Parameters
+    ----------
+    index
+        The planes.
+    aim
+        Directions of the rays, in float64: next to the image of the light x and y vanish.
+    distance
+        To the end of each ray, may be infinite [m].
     """
+    unit = aim * dr.rcp(dr.norm(aim))
+    x, y, z = (type(distance)(dr.dot(axis, unit)) for axis in index.axes)
     azimuth = diamond_angle(x, y)
-    return RayPlanes(x, y, z, azimuth, *planes_of_rays(index, azimuth, (x, y, z), ray_end))
+    first, count = planes_of_rays(index, azimuth, (x, y, z), index.distance / distance)
+    return RayPlanes(x, y, z, azimuth, first, count)
 
 
 def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
@@ -82,7 +92,7 @@ def read_plane(index: PlaneIndex, ray: RayPlanes, k, active):
     quotient, beyond = plane_crossing(index, number, (ray.x, ray.y, ray.z), active)
 
     def within(number, azimuth, unsure):
-        first, last = dr.gather(two_numbers(Float), index.spans, 2 * number, unsure)
+        first, last = dr.gather(two_numbers(Float), index.spans, number, unsure)
         return (azimuth >= first) & (azimuth < last)
 
     counts = active & beyond & (quotient > 0)

@@ -32,6 +32,5 @@ Read in this order:
 - `density_grid.py`: density on a grid, marched;
 - `bounded.py`: homogeneous media with bounds, in vacuum or in another; clouds;
 - `light_paths.py`: how much of the paths from a light to the points of a ray lies in a convex medium;
-- `bounded_rays.py`: their airlight, by few nodes between the bends of these paths;
-- `published_form.py`: the polynomial of Biri 2006 for bounded media, which kernels may have.
+- `bounded_rays.py`: their airlight, by few nodes between the bends of these paths.
 """

@@ -15,10 +15,9 @@ import drjit as dr
 
 from airlight.realtime.errors import InputError
 from airlight.realtime.scene.density import Density
-from airlight.realtime.scene.media.bounded_rays import BoundedRays, camera_pieces, check_form
+from airlight.realtime.scene.media.bounded_rays import BoundedRays, camera_pieces
 from airlight.realtime.scene.media.light_paths import BoundedMedium, chord, paths_from
 from airlight.realtime.scene.media.medium import Homogeneous
-from airlight.realtime.scene.media.published_form import ConstantLeg
 from airlight.realtime.scene.phase import Phase
 
 
@@ -142,35 +141,18 @@ class BoundedMedia(Homogeneous):
             clouds = replace(clouds, sigma_t=sigma_t)
         return replace(super().thicker(factor), bounded_media=bounded_media, clouds=clouds)
 
-    def lit(self, rays, light, geometry, *, kernel=None, form="kernel"):
-        """Return rays with one light.
-
-        `form` is one of `realtime.scene.media.bounded_rays.FORMS`, or 'kernel': 'paper' for a light that has a place
-        and a kernel that has a form for bounded media, otherwise 'exact', which asks no kernel.
+    def lit(self, rays, light, geometry, kernel=None):
+        """Return rays with one light, by the panels of this room.
 
         Raises
         ------
         InputError
-            For what a published form refuses.
+            For other kernels than `exact` and a light that has a place: they are of one medium without bounds.
         """
         if not self.bounded_media:  # what clouds fill is for their methods
-            return super().lit(rays, light, geometry, kernel=kernel)
-        polynomial = kernel.bounded_form if kernel is not None else None
-        if form == "kernel":
-            form = "exact" if polynomial is None or not light.w else "paper"
-            if form != "exact" and not self.clear:
-                raise InputError(
-                    "kernel: got a polynomial, which has each medium in vacuum; expected vacuum around the bounded "
-                    "media, or another kernel"
-                )
-        else:
-            check_form(self, form, light)
-        pieces = camera_pieces(self, rays)
-        if form == "exact" or polynomial is None:
-            return BoundedRays(self, light, rays, geometry, kernel, pieces, form)
-        # A polynomial must refuse here, not in a branch. Dr.Jit computes no value that nobody reads.
-        zero = type(geometry.height)(0)
-        for own in self.bounded_media:
-            segment = ConstantLeg(own.medium.sigma_t[0], zero, own.mean_distance, form == "printed")
-            polynomial(geometry, zero, zero, light, own.medium.phase, segment)
-        return BoundedRays(self, light, rays, geometry, kernel, pieces, form, polynomial)
+            return super().lit(rays, light, geometry, kernel)
+        if light.w and not (kernel is None or kernel.exact):
+            raise InputError(
+                f"kernel: got {kernel.name}, which is of one medium without bounds; expected exact in bounded media"
+            )
+        return BoundedRays(self, light, rays, geometry, kernel, camera_pieces(self, rays))

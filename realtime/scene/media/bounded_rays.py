@@ -27,27 +27,6 @@ from the panel's beginning linear in t: with the ends s_0 and s_1 from the foot,
 T = h (s_1 - s_0)/D. All terms are of one sign, and nothing divides by h: a segment far from the light or a ray close to
 it loses nothing. The largest angle, of tangent T, ends at s_0 + T r_0^2/(h - T s_0), nowhere where that is behind.
 For a light at infinity t is linear in x.
-
-The published approximation (section 4.2) puts a constant R for r in the exponent, and takes the distance x_n at which
-the ray enters from x. As printed it is
-
-    L = k_t exp(-k_t (r + R - x_n)) Omega/(4 pi h) int I exp(-k_t R (sin theta + 1)/cos theta) p dtheta,
-
-which cannot be meant: r before the integral is a variable of it, and the exponent within it counts R once more and lets
-h go. The exponent
-x - x_n + R with x = t + h tan theta gives
-
-    L = k_t exp(-k_t (t + R - x_n)) Omega/(4 pi h) int I exp(-k_t h tan theta) p dtheta.
-
-That is ``media=paper``. ``media=printed`` is the first equation with t for the r before the integral, which alone can
-be meant, and the exponent within it as it stands. A kernel may have a polynomial for either
-(`realtime.scene.media.published_form`); without one they are summed over panels. The paper treats each medium alone:
-the light reaches a body through vacuum, however many bodies are before it. The transmittance between the body and the
-camera is one factor for a ray, and is kept.
-
-References
-----------
-Biri, Arques, Michelin 2006, sections 4.2 and 5.2.
 """
 
 from dataclasses import dataclass
@@ -58,16 +37,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.errors import InputError
-from airlight.realtime.numerics.array_types import chosen_value, is_single
-from airlight.realtime.numerics.functions import exp_bounded, summed, unit_nodes
-from airlight.realtime.scene.lights import Light
+from airlight.realtime.numerics.array_types import is_single
+from airlight.realtime.numerics.functions import exp_bounded, unit_nodes
 from airlight.realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
-from airlight.realtime.scene.media.medium import Homogeneous, LitRays, Medium, Rays, optical_reach, unfinished
-from airlight.realtime.scene.media.published_form import ConstantLeg
+from airlight.realtime.scene.media.medium import Homogeneous, LitRays, Rays, optical_reach, unfinished
 from airlight.realtime.scene.rule_reach import TANGENT, TURN_DEPTH, TURN_NODES, angle_scale
 
-FORMS = ("exact", "paper", "printed")
 _NODES_DOUBLE = 6
 _MOST = 1000  # panels of a segment beside those that end where a path passes from facet to facet
 _DEPTH_DOUBLE = 1.6
@@ -90,8 +65,6 @@ class BoundedRays(LitRays):
     """Rays in bounded media, and one light: integrals are sums of albedo_j sigma_j J_j, RGB [1/m^2]."""
 
     pieces: tuple[Piece, ...] = ()
-    form: str = "exact"  #: of `FORMS`
-    polynomial: Any = None  #: for the published forms what takes the place of panels: `Kernel.bounded_form`, or None
 
     def airlight(self, x0, x1):
         """Return sum_j albedo_j sigma_j J_j over the lit segment [x0, x1] [m], RGB [1/m^2], from infinity [1].
@@ -105,17 +78,39 @@ class BoundedRays(LitRays):
             total += dr.if_stmt(
                 args=(dr.maximum(x0, piece.begin), dr.minimum(x1, piece.end)),
                 cond=dr.minimum(x1, piece.end) > dr.maximum(x0, piece.begin),
-                true_fn=lambda begin, end, piece=piece: _integral(self, piece, begin, end),
+                true_fn=lambda begin, end, piece=piece: self.integral(piece, begin, end),
                 false_fn=lambda begin, end: Color(0),
             )
         return total
 
-    def published_gamma(self, x):
-        """Return the integral from where the ray enters the one piece up to the distance x, and beyond, RGB [1/m^2]."""
-        if self.polynomial is None:
-            return self.airlight(type(x)(0), x)
-        (piece,) = self.pieces
-        return _published_sum(self, piece, *self.geometry.lit_segment(piece.begin, dr.maximum(x, piece.begin)))
+    def integral(self, piece: Piece, x0, x1):
+        """Return albedo sigma J over a segment [m] in one piece, a colour [1/m^2]."""
+        x1 = dr.minimum(x1, x0 + optical_reach(type(x0)) / piece.medium.least_extinction())
+        return _panels(self, piece, x0, x1, self.light_paths(piece, x0, x1))
+
+    def light_paths(self, piece: Piece, x0, x1) -> list[LightPaths]:
+        """Return the paths from the light to a segment [m] in one piece, through each medium that they may meet."""
+        rays = self.rays
+        return paths_from(self.medium, self.light, rays.origin, rays.direction, own=piece.number, segment=(x0, x1))
+
+    def growth(self, piece: Piece, x, r):
+        """Return how fast the depth of both paths grows along the ray, bounded media on the light's left out [1/m]."""
+        rate = reduce(dr.maximum, piece.medium.sigma_t)
+        if self.light.w and not self.medium.clear:
+            rate = rate + reduce(dr.maximum, self.medium.sigma_t)
+        return rate
+
+    def depths(self, piece: Piece, x, r, lengths) -> list[Any]:
+        """Return the optical depth of both paths at x, by channel; `lengths` of the light's by medium [m]."""
+        depths = []
+        for channel, around in enumerate(self.medium.sigma_t):
+            depth = dr.fma(piece.medium.sigma_t[channel], x - piece.begin, piece.before[channel])
+            if not self.medium.clear:
+                depth = dr.fma(around, r, depth)
+            for medium, length in lengths:
+                depth = dr.fma(medium.sigma_t[channel] - around, length, depth)
+            depths.append(depth)
+        return depths
 
     def distance_to_light(self, x):
         """Return r at a distance x of the rays [m]; 1 for a light at infinity."""
@@ -153,28 +148,6 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
             inside = reduce(or_, [(enter <= begin) & (begin < leave) for enter, leave in rays.crossed])
             pieces.append(piece(around, None, begin, dr.select(inside, begin, end)))
     return tuple(pieces)
-
-
-def check_form(medium: Medium, form: str, light: Light) -> None:
-    """Refuse a form that is unknown or does not fit the media or the light."""
-    if form not in FORMS:
-        raise InputError(f"media: got {form!r}, expected one of {', '.join(FORMS)}")
-    if form != "exact" and medium.bounded_media and not medium.clear:
-        raise InputError(f"media={form}: needs vacuum around the bounded media; use media=exact")
-    if not light.w and form != "exact":
-        raise InputError(f"media={form}: the published approximation is of lights with a place; use media=exact")
-
-
-def _integral(ray: BoundedRays, piece: Piece, x0, x1):
-    """Integrate one segment in one piece."""
-    if ray.polynomial is not None:
-        return _published_sum(ray, piece, x0, x1)
-    Float = type(x0)
-    x1 = dr.minimum(x1, x0 + optical_reach(Float) / piece.medium.least_extinction())
-    if ray.form != "exact":
-        return _panels(ray, piece, x0, x1, [])
-    paths = paths_from(ray.medium, ray.light, ray.rays.origin, ray.rays.direction, own=piece.number, segment=(x0, x1))
-    return _panels(ray, piece, x0, x1, paths)
 
 
 def _panels(ray: BoundedRays, piece: Piece, x0, x1, paths: list[LightPaths]):
@@ -236,7 +209,7 @@ def _after(own: Envelopes, change, x) -> Envelopes:
 def _longest(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x):
     """Return the length of the longest panel that begins at x [m]."""
     r, h = ray.distance_to_light(x), ray.height
-    longest, rate = type(x)(dr.inf), reduce(dr.maximum, piece.medium.sigma_t)
+    longest, rate = type(x)(dr.inf), ray.growth(piece, x, r)
     if ray.light.w:
         s = x - ray.geometry.foot
         phase, e = piece.medium.phase, dr.select(s > 0, r + s, h) / dr.select(s > 0, h, r - s)
@@ -248,10 +221,6 @@ def _longest(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes,
         turning = h - tangent * s
         longest = dr.select(turning > 0, tangent * dr.square(r) / turning, dr.inf)
         longest = dr.minimum(longest, dr.select(s < 0, _NEARER, _FARTHER) * r)
-        if ray.form == "printed":
-            rate = rate * (1 + ray.medium.bounded_media[piece.number].mean_distance * (1 + s / r) / h)
-        if not ray.medium.clear:
-            rate = rate + reduce(dr.maximum, ray.medium.sigma_t)
     for path, own in zip(paths, envelopes):
         steepness, smooth = path.steepness(own, x, r)
         rate = rate + steepness * reduce(dr.maximum, path.bounded.medium.sigma_t)
@@ -281,7 +250,7 @@ def _panel(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x
             x, r, fraction = dr.fma(t, length, x0), Float(1), weight
         fraction = fraction * _scattered(ray, piece, x, r)
         lengths = [(path.bounded.medium, path.length(own, x, r)) for path, own in zip(paths, envelopes)]
-        for channel, depth in enumerate(_depths(ray, piece, x, r, lengths)):
+        for channel, depth in enumerate(ray.depths(piece, x, r, lengths)):
             totals[channel] += fraction * exp_bounded(-depth)
     return [scale * total for total in totals]
 
@@ -290,58 +259,3 @@ def _scattered(ray: BoundedRays, piece: Piece, x, r):
     """Return the phase function times the spot's profile [1]."""
     phase = ray.angle(x - ray.geometry.foot, r)(piece.medium.phase)
     return phase * ray.geometry.falloff(ray.light, x) if ray.light.varies else phase
-
-
-def _depths(ray: BoundedRays, piece: Piece, x, r, lengths) -> list[Any]:
-    """Return the optical depth of both paths at x, by channel; `lengths` of the light's by medium [m]."""
-    if ray.form != "exact":
-        return _published_depths(ray, piece, x, r)
-    depths = []
-    for channel, around in enumerate(ray.medium.sigma_t):
-        depth = dr.fma(piece.medium.sigma_t[channel], x - piece.begin, piece.before[channel])
-        if not ray.medium.clear:
-            depth = dr.fma(around, r, depth)
-        for medium, length in lengths:
-            depth = dr.fma(medium.sigma_t[channel] - around, length, depth)
-        depths.append(depth)
-    return depths
-
-
-def _published_depths(ray: BoundedRays, piece: Piece, x, r) -> list[Any]:
-    """Return the exponents with the constant R for the light's path, by channel."""
-    distance = ray.medium.bounded_media[piece.number].mean_distance
-    constants = [before + s * (distance - piece.begin) for before, s in zip(piece.before, piece.medium.sigma_t)]
-    if ray.form == "paper":
-        return [dr.fma(s, x, constant) for s, constant in zip(piece.medium.sigma_t, constants)]
-    s, h = x - ray.geometry.foot, ray.height
-    ratio = dr.select(s > 0, (r + s) / h, h / (r - s))  # (sin theta + 1)/cos theta, neither form cancels
-    depth = dr.fma(distance, ratio, ray.geometry.foot)
-    return [dr.fma(sigma, depth, constant) for sigma, constant in zip(piece.medium.sigma_t, constants)]
-
-
-def _published_sum(ray: BoundedRays, piece: Piece, x0, x1):
-    """Return albedo sigma J over a segment with the constant R, by the polynomial of a kernel, a colour [1/m^2].
-
-    The segment may lie before the medium: there the exponent is continued, as section 4.2 does that begins all
-    integrals at the camera.
-    """
-    Color = type(ray.medium.albedo)
-    distance = ray.medium.bounded_media[piece.number].mean_distance
-
-    def integral(x0, x1):
-        channels = []
-        for before, sigma in zip(piece.before, piece.medium.sigma_t):
-            depth = dr.fma(sigma, distance - piece.begin, before)
-            segment = ConstantLeg(sigma, depth, distance, ray.form == "printed")
-            channels.append(sigma * ray.polynomial(ray.geometry, x0, x1, ray.light, piece.medium.phase, segment))
-        return piece.medium.albedo * Color(*channels)
-
-    segments = ray.geometry.smooth_subsegments(ray.light, x0, x1)
-    if len(segments) == 1:
-        return integral(x0, x1)
-    # A loop: the integral is long, and its code need not be there for each segment.
-    return summed(
-        len(segments),
-        lambda number: integral(*(chosen_value(ends, number) for ends in zip(*segments, strict=True))),
-        dr.zeros(Color, dr.width(ray.geometry.height, x0, x1)),
-    )

@@ -139,16 +139,14 @@ class HeightFog(VaryingMedium):
         dr.make_opaque([layer.sigma_t for layer in layers], thicker.constant)
         return thicker
 
-    def lit(self, rays, light, geometry, *, kernel=None, form="kernel"):
+    def lit(self, rays, light, geometry, kernel=None):
         """Return rays with one light, by the panels of this module, or by those of the kernel `quadrature`.
 
         Raises
         ------
         InputError
-            For other kernels, which are those of homogeneous media, and for published forms of bounded media.
+            For other kernels, which are those of homogeneous media.
         """
-        if form not in ("kernel", "exact"):
-            raise InputError(f"media={form}: the published approximation is of bounded media; use media=exact")
         nodes = None if kernel is None or kernel.exact else kernel.asinh_nodes
         if light.w and not (kernel is None or kernel.exact or nodes is not None):
             raise InputError(

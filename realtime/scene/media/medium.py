@@ -123,7 +123,7 @@ class Medium(ABC):
     def thicker(self, factor: float) -> "Medium":
         """Return it with the extinction times a factor; the albedo stays."""
 
-    def lit(self, rays: Rays, light: Light, geometry, *, kernel: Any = None, form: str = "kernel") -> "LitRays":
+    def lit(self, rays: Rays, light: Light, geometry, kernel: Any = None) -> "LitRays":
         """Return rays with one light.
 
         Parameters
@@ -132,8 +132,8 @@ class Medium(ABC):
             From `rays`, and any light.
         geometry
             Where they pass the light, a `realtime.rays.RayGeometry`.
-        kernel, form
-            A kernel, and a form of `realtime.scene.media.bounded_rays`, for media that use them.
+        kernel
+            An airlight kernel, for media that ask one.
         """
         return LitRays(self, light, rays, geometry, kernel)
 
@@ -294,8 +294,8 @@ class Homogeneous(Medium):
         """Albedo sigma_t [1/m]."""
         return self.albedo * self.colour(self.sigma_t)
 
-    def lit(self, rays, light, geometry, *, kernel=None, form="kernel"):
-        """Return rays with one light; `form` is for bounded media."""
+    def lit(self, rays, light, geometry, kernel=None):
+        """Return rays with one light, whose integral is the kernel's."""
         return HomogeneousRays(self, light, rays, geometry, kernel)
 
     def thicker(self, factor):

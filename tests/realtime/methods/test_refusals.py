@@ -17,7 +17,8 @@ from tests.helpers.lamps import lamp_scene
         ("soft-shafts", {"scale": 8}, "scale: got 8 and an image of 18 x 12, expected one that divides both sides"),
         ("soft-shafts", {"interleave": True}, "interleave: got 5 points of a light, expected 1, 2, 4, 8 or 16"),
         ("light-volumes", {"map": 500}, "map: got 500, expected a power of two from 4 to 8192"),
-        ("light-volumes", {"tessellation": "adaptive"}, "tessellation=adaptive: got evaluation=walk.*=mesh"),
+        ("light-volumes", {"tessellation": "adaptive"}, "got a parameter 'tessellation'.*see light-volumes-2010"),
+        ("shadow-planes", {"order": "paper"}, "got a parameter 'order'.*see shadow-planes-2006"),
         ("shadow-planes", {"points": 0}, "points: got 0, expected a whole number from 1 to 4096"),
         (
             "shadow-planes",

@@ -59,20 +59,20 @@ def test_a_scene_by_name_dictionary_mitsuba_scene_and_again(variant):
 def test_a_frame_is_that_of_the_parts_it_is_made_of(variant):
     from airlight.validation.study.configuration import configuration, prepared
 
-    frame = airlight.render("sphere-spot", "shadow-planes", "quadrature-32", size=TINY, order="paper")
+    frame = airlight.render("sphere-spot", "shadow-planes-2006", "quadrature-32", size=TINY, order="none")
     scene = airlight.read_scene(airlight.load_scene("sphere-spot", TINY).scene)
-    chosen = configuration("shadow-planes", "quadrature-32", {"order": "paper"})
+    chosen = configuration("shadow-planes-2006", "quadrature-32", {"order": "none"})
     direct = airlight.render_frame(prepared(scene, chosen))
     np.testing.assert_array_equal(frame.airlight, direct.airlight)
     np.testing.assert_array_equal(frame.surface, direct.surface)
     np.testing.assert_array_equal(frame.depth, direct.distance)
     assert (frame.method, frame.kernel, dict(frame.parameters)) == (
-        "shadow-planes",
+        "shadow-planes-2006",
         "quadrature-32",
-        {"order": "paper"},
+        {"order": "none"},
     )
     assert frame.plan["lights"] == "1 spot"
-    assert frame.image.attributes["airlight:order"] == "paper"
+    assert frame.image.attributes["airlight:order"] == "none"
     assert frame.times is None
 
 

@@ -49,8 +49,8 @@ def test_a_configuration_has_its_own_kernel_and_parameters(variant):
     chosen = configuration("shadow-planes", "taylor", {"points": 8})
     assert configuration_of(chosen, None, {}) is chosen
     assert configuration_of("shadow-planes", "taylor", {"points": 8}) == chosen
-    with pytest.raises(airlight.InputError, match=r"its own kernel and parameters; leave out kernel, order$"):
-        configuration_of(chosen, "exact", {"order": "paper"})
+    with pytest.raises(airlight.InputError, match=r"its own kernel and parameters; leave out kernel, points$"):
+        configuration_of(chosen, "exact", {"points": 3})
 
 
 def test_files_have_one_of_the_endings_and_none_is_no_file(tmp_path):

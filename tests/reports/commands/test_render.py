@@ -99,7 +99,7 @@ def test_what_was_written_is_said_and_times_are_measured_only_if_asked(variant, 
 def test_open_occluders_are_warned_of_where_planes_have_an_order_of_a_paper(variant, capfd):
     run("sphere-spot", *SMALL, "--method", "shadow-planes")
     assert "airlight: warning:" not in capfd.readouterr().err
-    run("sphere-spot", *SMALL, "--method", "shadow-planes", "--set", "order=paper")
+    run("sphere-spot", *SMALL, "--method", "shadow-planes-2006")
     err = capfd.readouterr().err
     assert err.count("airlight: warning: shape 'floor' is open") == 1
 

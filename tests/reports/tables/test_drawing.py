@@ -24,7 +24,7 @@ def _wide() -> Table:
         *numbers(other="light moved", how={"unit": "ms", "minor": True}),
         *numbers(*(f"error {n}" for n in range(5))),
     )
-    values = {"name": "shadow-planes (exact, order=paper)", "time": Measured(1.2345, 1.1, 1.3), "other": 3.21}
+    values = {"name": "shadow-planes-2006 (exact, order=paper)", "time": Measured(1.2345, 1.1, 1.3), "other": 3.21}
     return Table("A title that is long " * 6, columns, (Row(values | {f"error {n}": 1e-5 / 3 for n in range(5)}),))
 
 

@@ -5,14 +5,13 @@
 """
 
 import json
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from airlight.realtime.kernels.exact import exact
-from airlight.realtime.kernels.taylor import taylor
+from airlight.realtime.kernels.taylor import taylor, taylor_printed
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.kernels.cases import evaluate_cases, relative_error
 from airlight.validation.kernels.rays import wide_rays
@@ -224,7 +223,7 @@ def test_the_print_costs_accuracy_near_the_foot(variant, phase):
     """
     cases = wide_rays(2048, phase)
     near = np.max([np.abs(np.arctan2(x - cases.foot, cases.height)) for x in (cases.x0, cases.x1)], axis=0) <= 1.0
-    values = [evaluate_cases(cases, kernel, "double") for kernel in (partial(taylor, printed=True), taylor, exact)]
+    values = [evaluate_cases(cases, kernel, "double") for kernel in (taylor_printed, taylor, exact)]
     printed, derived, certain = (relative_error(J, cases.value, "double")[near] for J in values)
     assert np.mean(printed <= 0.01) < np.mean(derived <= 0.01) - 0.05
     assert np.mean(printed <= 0.1) < np.mean(derived <= 0.1)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from airlight.realtime.frame.renderer import render_frame
-from airlight.realtime.methods.light_volumes.published.mesh import VolumeMesh, volume_mesh
-from airlight.realtime.methods.light_volumes.published.tessellation import divide, triangles
+from airlight.realtime.methods.published.billeter2010.mesh import VolumeMesh, volume_mesh
+from airlight.realtime.methods.published.billeter2010.tessellation import divide, triangles
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map
 from airlight.validation.papers import light_volumes
@@ -91,7 +91,7 @@ def test_the_clamped_sum_is_the_airlight_of_the_method(variant):
     loaded = load_scene("omni-box", (16, 12)).scene
     scene = read_scene(loaded)
     (light,) = scene.lights
-    frame = render_frame(light_volumes._renderer(scene, "mesh", 32))
+    frame = render_frame(light_volumes._renderer(scene, "light-volumes-2010", 32))
     mesh = volume_mesh(cast_shadow_map(scene.geometry, light, 32), light)
     J = light_volumes.crossings_sum(loaded, frame.distance.astype(float).ravel(), mesh, clamp=True)
     factor = frame.airlight / J[..., None]

@@ -41,7 +41,7 @@ def test_words_become_values_of_the_type_of_the_default():
 
 
 def test_every_method_has_a_standard_configuration():
-    assert {standard.method for standard in STANDARD} == set(FOG_METHODS)
+    assert {standard.method for standard in STANDARD} == {*FOG_METHODS, "shadow-planes-2006"}
     assert {standard.method for standard in QUICK} == set(FOG_METHODS)
     assert set(QUICK) <= set(STANDARD)
     assert {standard.kernel for standard in STANDARD} - {None} <= set(KERNELS)
@@ -53,7 +53,7 @@ def test_chosen_methods_bring_their_standard_configurations():
     )
     # Those whose standard configurations say their light samples have their defaults too, for scenes without any.
     for_extent = {Configuration("soft-shafts"), Configuration("froxel-fog")}
-    assert set(chosen_configurations(list(FOG_METHODS))) == set(STANDARD) | for_extent
+    assert set(chosen_configurations()) == set(STANDARD) | for_extent
     with refused("did you mean"):
         chosen_configurations(["unshadowed", "unshadwed"])
 

@@ -118,7 +118,7 @@ def causes(parts):
             pytest.param(*case, marks=pytest.mark.slow)
             for case in (
                 ("unshadowed", "taylor", {}),
-                ("shadow-planes", "taylor", {"order": "none"}),
+                ("shadow-planes-2006", "taylor", {"order": "none"}),
                 ("light-volumes", None, {"map": 64}),
                 ("min-max", None, {"map": 64}),
                 ("froxel-fog", None, {"width": 8, "height": 6, "slices": 8, "map": 64}),

@@ -13,6 +13,7 @@ from scipy import stats
 from airlight.analytic.errors import InputError
 from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.memory import Memory
+from airlight.realtime.methods.registry import FOG_METHODS
 from airlight.realtime.methods.unshadowed import unshadowed
 from airlight.realtime.scene.read_scene import SceneFeatures, read_scene
 from airlight.reference.quadrature.ray_values import ReferenceImage
@@ -132,7 +133,7 @@ def test_a_row_of_a_noisy_method_has_the_errors_of_its_runs():
 @pytest.mark.usefixtures("variant")
 def test_a_refusal_is_a_row():
     """A refusal is a line of the table; one bad configuration must not end a report."""
-    row, frame = row_of("windows", configuration("shadow-planes", None, {"media": "paper"}))
+    row, frame = row_of("windows", configuration("shadow-planes-2006", None, {"media": "paper"}))
     assert (row.status, frame, row.error, row.times) == ("refused", None, None, None)
     assert "lights with a place" in row.reason
     assert "\n" not in row.reason
@@ -216,13 +217,13 @@ def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
     assert configurations_for(replace(lamp, bounded=True, clear=True), STANDARD) == STANDARD
     unbounded = configurations_for(lamp, STANDARD)
     (left_out,) = (configuration for configuration in STANDARD if configuration not in unbounded)
-    assert dict(left_out.parameters) == {"media": "paper"}
+    assert dict(left_out.parameters) == {"order": "exact", "media": "paper"}
     without_points = configurations_for(FEATURES, STANDARD)
     assert set(unbounded) - set(without_points) == {given for given in STANDARD if "points" in dict(given.parameters)}
     left = configurations_for(replace(lamp, shadows=False), STANDARD)
     assert 0 < len(left) < len(STANDARD)
-    assert all(not {"shadow", "map"} & set(dict(configuration.parameters)) for configuration in left)
-    assert {configuration.method for configuration in left} == {configuration.method for configuration in STANDARD}
+    assert all(not {"shadow", "map", "order"} & set(dict(configuration.parameters)) for configuration in left)
+    assert {configuration.method for configuration in left} == set(FOG_METHODS)
 
 
 def test_an_hour_and_the_memory_are_the_bounds(variant, monkeypatch):

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from airlight.realtime.errors import InputError
 from airlight.realtime.frame.renderer import image_frame, run_stages
 from airlight.realtime.methods.light_volumes.jump_search import _JUMP, with_walls
-from airlight.realtime.methods.light_volumes.published.mesh import volume_mesh
 from airlight.realtime.methods.light_volumes.texel_walls import PLACES, walled_heights
+from airlight.realtime.methods.published.billeter2010.mesh import volume_mesh
+from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
@@ -23,9 +24,9 @@ from airlight.validation.estimates.quadrature import reference_image
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.frames import render, renderer
 from tests.helpers.light_frames import (
-    EVALUATIONS,
     GRID,
     SCENES,
+    VOLUMES,
     camera,
     differ,
     lamp,
@@ -73,8 +74,8 @@ def test_any_size_of_image(variant, size):
 
 
 @pytest.mark.parametrize("axis", [0, 2])
-@pytest.mark.parametrize("evaluation", EVALUATIONS)
-def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation):
+@pytest.mark.parametrize("method", VOLUMES)
+def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, method):
     """The plane of the border holds the camera, and a column, a row or a diagonal of its pixels."""
     origin, target, up, light = (
         np.roll(vector, axis) for vector in ((1, -4, 1.5), (1, 4, 1.5), (0, 0, 1), (0, 0, 2.5))
@@ -84,7 +85,7 @@ def test_rays_on_the_border_of_two_faces_are_lit_once(variant, axis, evaluation)
     loaded = loaded_scene(**changes)
     wanted = render(loaded, "unshadowed").airlight
     # Three faces have nodes of their own: within the kernel's 5e-6.
-    assert render(loaded, "light-volumes", map=64, evaluation=evaluation).airlight == pytest.approx(wanted, rel=1e-5)
+    assert render(loaded, method, map=64).airlight == pytest.approx(wanted, rel=1e-5)
 
 
 HEIGHTS = (0.0, 0.15, 0.4, 0.7, 1.9)  # inverse depths [1/m]; few, so that many texels are flat
@@ -98,8 +99,7 @@ def renderers(kind, view):
     changes = camera(*VIEWS[view], size=(13, 9)) | ({"lamp": spot(cutoff=50.0, beam=50.0)} if kind == "spot" else {})
     loaded = loaded_scene(**changes)
     both = [
-        renderer(loaded, "light-volumes", precision="double", map=SMALL, evaluation=evaluation, walls="slanted")
-        for evaluation in EVALUATIONS
+        renderer(loaded, method, precision="double", map=SMALL, **parameters) for method, parameters in VOLUMES.items()
     ]
     scene = both[0].scene
     return loaded, both, cast_shadow_map(scene.geometry, scene.lights[0], SMALL)
@@ -265,16 +265,15 @@ def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
 def test_a_mesh_is_for_media_without_bounds(variant):
     smoke = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
     loaded = mi.load_dict(clear_scene(cloud=smoke))
-    with pytest.raises(InputError, match=r"evaluation=mesh: the scene has a medium with bounds.*evaluation=walk"):
-        renderer(loaded, "light-volumes", evaluation="mesh")
+    with pytest.raises(InputError, match=r"light-volumes-2010: the scene has a medium with bounds.*use light-volumes"):
+        renderer(loaded, "light-volumes-2010")
     assert np.max(render(loaded, "light-volumes", map=16).airlight) > 0
 
 
 @pytest.mark.claim("memory-before-it-is-taken")
-@pytest.mark.parametrize("evaluation", EVALUATIONS)
-def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
+@pytest.mark.parametrize("method", VOLUMES)
+def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, method):
     import airlight.realtime.memory
-    import airlight.realtime.methods.light_volumes.method
 
     def never(*args):
         raise AssertionError("a map was cast")
@@ -284,8 +283,8 @@ def test_memory_is_counted_before_it_is_taken(variant, monkeypatch, evaluation):
         airlight.realtime.memory, "usable_memory", lambda: airlight.realtime.memory.Memory(10**9, "this machine has")
     )
     with monkeypatch.context() as patch:
-        patch.setattr(airlight.realtime.methods.light_volumes.method, "cast_shadow_map", never)
+        patch.setattr(f"{METHODS[method].__module__}.cast_shadow_map", never)
         message = r"map: 4096 texels for 1 light\(s\): needs [0-9.]+ GB of memory, this machine has 1 GB; use a smaller"
         with pytest.raises(InputError, match=message):
-            renderer(loaded, "light-volumes", map=4096, evaluation=evaluation)
-    render(loaded, "light-volumes", map=64, evaluation=evaluation)
+            renderer(loaded, method, map=4096)
+    render(loaded, method, map=64)

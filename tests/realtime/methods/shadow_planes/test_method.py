@@ -91,11 +91,3 @@ def test_enclosed_light_is_black(variant):
     frame = render(scene_with(SOUND["sphere"](), lamp=lamp(0.13, -0.07, 1.09)), "shadow-planes")
     assert np.all(frame.airlight == 0)
     assert np.all(frame.surface == 0)
-
-
-def test_ambient_light_is_added_by_its_formula(variant):
-    scene = scene_with(SOUND["sphere"]())
-    without, with_it = (render(scene, "shadow-planes", precision="double", ambient=each) for each in (0.0, 0.23))
-    depth = 0.31 * np.minimum(without.distance, 1e30)
-    expected = 0.23 * np.array([0.9, 0.8, 0.7]) * (1 - np.exp(-depth))[..., None]
-    assert with_it.airlight - without.airlight == pytest.approx(expected, rel=1e-5)

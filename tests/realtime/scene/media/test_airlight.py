@@ -141,7 +141,7 @@ def test_a_segment_whose_panels_run_out_is_refused(variant, monkeypatch):
 
 def test_an_ambient_field_fills_bounded_media(variant):
     scene = clear_scene(ball=fog_sphere(SPHERE_AT, RADIUS, sigma_t=0.7))
-    gain = render(scene, "shadow-planes", ambient=0.3).airlight - render(scene, "shadow-planes").airlight
+    gain = render(scene, "shadow-planes-2006", ambient=0.3).airlight - render(scene, "unshadowed").airlight
     reference = read_reference(mi.load_dict(scene))
     near, far = airlight_sum.ball(SPHERE_AT, RADIUS)(reference.origin, reference.direction)
     chord = far - near

@@ -74,7 +74,7 @@ def relative_errors(chosen, precision, kernel=KERNELS["exact"]):
     aim = mi.Vector3d(*(mi.Float64(column) for column in directions))
     rays = medium.rays(vector([row.origin for row in chosen]), vector(directions.T), aim)
     geometry = ray_geometry(rays.origin, rays.aim, light)
-    lit = medium.lit(rays, light, geometry, kernel=kernel)
+    lit = medium.lit(rays, light, geometry, kernel)
     found = lit.airlight(number([row.x0 for row in chosen]), number([row.x1 for row in chosen]))
     expected = np.array([row.value for row in chosen])
     return np.abs(np.array(found.x, dtype=np.float64) / expected - 1)

@@ -2,7 +2,7 @@
 """Every triangle of a light volume against every pixel that it covers.
 
 A light volume is drawn (Billeter, Sintorn, Assarsson 2010, section 3) by its crossings with the ray of every pixel, in
-any order: `realtime.methods.light_volumes.published.raster` adds them up.
+any order: `realtime.methods.published.billeter2010.raster` adds them up.
 
 Scan conversion in homogeneous coordinates. A vertex (P w, w) becomes (a, b, z, w): with the depth z along the view and
 the point in the image at column a/z, row b/z. Nothing is divided before it must be, so a vertex at infinity (w = 0) is
@@ -47,7 +47,7 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.realtime.methods.interface.method import View
-from airlight.realtime.methods.light_volumes.published.mesh import VolumeMesh
+from airlight.realtime.methods.published.billeter2010.mesh import VolumeMesh
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.camera import Camera, ray_directions, read_camera
 from airlight.realtime.scene.lights import Light
@@ -253,7 +253,7 @@ def _crossings(spans: _Spans, camera: Camera, span, step) -> Crossings:
 def crossing_sum(batches: Iterable[Crossings], airlight: LitRays, distance, *, lane: Any = None) -> Any:
     """Return J along the lit parts of rays, the signed sum over their crossings [1/m].
 
-    `batches`: from `realtime.methods.light_volumes.published.raster.signed_crossings`; `airlight`, `distance`: the rays
+    `batches`: from `realtime.methods.published.billeter2010.raster.signed_crossings`; `airlight`, `distance`: the rays
     with the light, whose cone clips every crossing, and the distances to the visible surface [m]; `lane`: by pixel
     number its entry among the rays; None where they are in the order of the image.
 

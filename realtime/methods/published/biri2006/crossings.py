@@ -23,6 +23,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from airlight.realtime.methods.published.biri2006.planes import PaperPlanes
 from airlight.realtime.methods.shadow_planes.plane_table import PlaneIndex
 from airlight.realtime.methods.shadow_planes.sweep import RayPlanes, read_plane
 
@@ -59,7 +60,7 @@ class _Draw:
 
 
 def sum_crossings(
-    index: PlaneIndex,
+    planes: PaperPlanes,
     ray: RayPlanes,
     distance,
     gammas,
@@ -71,12 +72,13 @@ def sum_crossings(
 ):
     """Add up Gamma over the crossings of every ray.
 
-    `index`, `ray`: the planes and the rays; `distance`: to the visible surface, or to the end in a bounded medium [m];
+    `planes`, `ray`: the planes and the rays; `distance`: to the visible surface, or to the end in a bounded medium [m];
     `gammas`: functions (plane, ray, x) and (x) that give the radiance of Gamma at a crossing and at the surface;
     `order`: 'exact', 'paper' or 'none'; `buffer`: what keeps the sum; None for float; `start`: what is in the buffer
     before, or None; `entry`: where rays enter a bounded medium, or None. Returns `total`: the radiance; `lit`: whether
     the light reaches the end.
     """
+    index = planes.index
     at_plane, at_surface = gammas
     ray_end = index.distance / distance
     width = dr.width(ray.x)
@@ -101,7 +103,7 @@ def sum_crossings(
         (draw,) = dr.while_loop(
             state=(draw,),
             cond=lambda draw: (draw.factor == 0) & (draw.place < ray.count),
-            body=lambda draw: (_next(index, ray, ray_end, draw, order, key),),
+            body=lambda draw: (_next(planes, ray, ray_end, draw, order, key),),
             labels=("draw",),
         )
         x = dr.minimum(index.distance / dr.select(draw.factor == 0, index.distance, draw.quotient), distance)
@@ -137,13 +139,13 @@ def _entry_key(index: PlaneIndex, ray: RayPlanes, entry: Entry, order: str):
     return -along * dr.rsqrt(dr.fma(along, along, beside * beside))
 
 
-def _next(index: PlaneIndex, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key) -> _Draw:
+def _next(planes: PaperPlanes, ray: RayPlanes, ray_end, draw: _Draw, order: str, entry_key) -> _Draw:
     """Read the next plane of the list."""
-    quotient, crossed, gain, number = read_plane(index, ray, draw.place, draw.place < ray.count)
+    quotient, crossed, gain, number = read_plane(planes.index, ray, draw.place, draw.place < ray.count)
     crossed &= quotient > ray_end
     counts = crossed
     if entry_key is not None and order == "paper":
-        crossed &= -dr.gather(type(ray.x), index.spans, number * 4 + 3, crossed) > entry_key
+        crossed &= -dr.gather(type(ray.x), planes.centres, number, crossed) > entry_key
         counts = crossed
     elif entry_key is not None:
         counts = crossed & (quotient < entry_key)

@@ -10,7 +10,7 @@ quadrilateral that a graphics card draws as two triangles; in the coordinates p 
 
 Near the light Gamma falls as 1/u. Interpolated linearly between u and ratio u it is too large by up to (ratio + 1)^2/(4
 ratio) - 1, 4 % for 1.5, at whatever distance: this is why rows at equal ratios are wise. The planes of a cone begin
-NEARNESS of the camera's distance from the light (`realtime.methods.shadow_planes.silhouettes`); by the same ratio they
+NEARNESS of the camera's distance from the light (`realtime.methods.published.biri2006.planes`); by the same ratio they
 need log(1/NEARNESS)/log(ratio) rows, 35, to come as far as the camera, and have so many more than the planes of
 occluders.
 
@@ -30,7 +30,7 @@ of it, and so is the error of its interpolation. Here all Gamma_m begin at A, an
 rounding that is the same. The passes are
 
 * stage 3: add Gamma_m(E) if E is lit; "the lit areas of objects and of the medium boundary";
-* stages 4 and 5: the planes before E, and at A the bounds (`realtime.methods.shadow_planes.published_crossings`).
+* stages 4 and 5: the planes before E, and at A the bounds (`realtime.methods.published.biri2006.crossings`).
 
 Gamma_m is evaluated at the vertices of planes and surfaces, each with the x_n of its own ray, "computed on the fly".
 The ray of a vertex may miss the medium. The paper does not say what x_n is then; for a sphere x_n is the foot of its
@@ -53,9 +53,9 @@ import mitsuba as mi
 
 from airlight.realtime.errors import InputError
 from airlight.realtime.methods.interface.method import View
-from airlight.realtime.methods.shadow_planes.plane_table import PlaneIndex
-from airlight.realtime.methods.shadow_planes.published_crossings import Buffer, Entry, sum_crossings
-from airlight.realtime.methods.shadow_planes.silhouettes import NEARNESS
+from airlight.realtime.methods.published.biri2006.crossings import Buffer, Entry, sum_crossings
+from airlight.realtime.methods.published.biri2006.media import ConstantRays, gamma_in
+from airlight.realtime.methods.published.biri2006.planes import NEARNESS, PaperPlanes
 from airlight.realtime.methods.shadow_planes.sweep import RayPlanes
 from airlight.realtime.rays import ray_geometry
 from airlight.realtime.scene.lights import Light
@@ -73,25 +73,25 @@ def gamma_at(view: View, light: Light, point, *, kernel):
     offset = point - view.origin
     distance = dr.norm(offset)
     rays = view.medium.rays(view.origin, offset / distance)
-    airlight = view.medium.lit(rays, light, ray_geometry(rays.origin, rays.direction, light), kernel=kernel)
+    airlight = view.medium.lit(rays, light, ray_geometry(rays.origin, rays.direction, light), kernel)
     return airlight.radiance(airlight.gamma(distance))
 
 
-def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone: bool = False):
+def mesh_gamma(planes: PaperPlanes, light: Light, gamma: Gamma, *, rows: int, cone: bool = False):
     """Return the function (plane, ray, x) that interpolates Gamma on the meshes of the planes.
 
-    `index`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of occluders; `cone`: whether
+    `planes`, `light`, `gamma`: the planes of a light, and Gamma; `rows`: of the planes of occluders; `cone`: whether
     planes of a cone are among them.
     """
     further = math.ceil(-math.log(NEARNESS) / math.log(RATIO)) if cone else 0
     occluders_rows, rows = rows, rows + further
+    index = planes.index
     Float, Vector = type(index.distance), type(light.position)
-    planes = dr.width(index.ends) // 6
-    lane = dr.arange(mi.UInt32, planes * 2 * rows)
+    lane = dr.arange(mi.UInt32, dr.width(planes.ends) // 6 * 2 * rows)
     row, end = lane % rows, lane // rows
     if further:
-        row = dr.minimum(row, _last_row(index, end // 2, occluders_rows, rows))
-    corner = Vector(*(dr.gather(Float, index.ends, end * 3 + k) for k in range(3))) * RATIO ** Float(row)
+        row = dr.minimum(row, _last_row(planes, end // 2, occluders_rows, rows))
+    corner = Vector(*(dr.gather(Float, planes.ends, end * 3 + k) for k in range(3))) * RATIO ** Float(row)
     x_axis, y_axis, z_axis = (Vector(axis) for axis in index.axes)
     point = light.position + x_axis * corner.x + y_axis * corner.y + z_axis * corner.z
     values = gamma(point)
@@ -99,7 +99,7 @@ def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone
     Color = type(values)
 
     def at(number, ray, x):
-        a, b = ([dr.gather(Float, index.ends, (number * 2 + side) * 3 + k) for k in range(2)] for side in (0, 1))
+        a, b = ([dr.gather(Float, planes.ends, (number * 2 + side) * 3 + k) for k in range(2)] for side in (0, 1))
         # The crossing (x wx, x wy) in the plane of the projections of a and b.
         cross = dr.fma(a[0], b[1], -a[1] * b[0])
         p = x * dr.fma(ray.x, b[1], -ray.y * b[0]) / cross
@@ -107,7 +107,7 @@ def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone
         p, q = dr.maximum(p, 0), dr.maximum(q, 0)
         u = dr.clip(p + q, 1, RATIO ** (rows - 1))
         if further:
-            u = dr.minimum(u, RATIO ** Float(_last_row(index, number, occluders_rows, rows)))
+            u = dr.minimum(u, RATIO ** Float(_last_row(planes, number, occluders_rows, rows)))
         t = dr.clip(q / dr.maximum(p + q, 1e-30), 0, 1)
         cell = dr.minimum(mi.UInt32(dr.log(u) * (1 / math.log(RATIO))), rows - 2)
         near = RATIO ** Float(cell)
@@ -126,11 +126,11 @@ def mesh_gamma(index: PlaneIndex, light: Light, gamma: Gamma, *, rows: int, cone
     return at
 
 
-def _last_row(index: PlaneIndex, plane, rows: int, rows_of_cone: int):
+def _last_row(planes: PaperPlanes, plane, rows: int, rows_of_cone: int):
     """Return the last row of planes: those of a cone begin where no occluder is."""
-    Float = type(index.distance)
-    first = [dr.gather(Float, index.ends, plane * 6 + k) for k in range(3)]
-    of_cone = sum(dr.square(part) for part in first) < dr.square(10 * NEARNESS * index.distance)
+    Float = type(planes.index.distance)
+    first = [dr.gather(Float, planes.ends, plane * 6 + k) for k in range(3)]
+    of_cone = sum(dr.square(part) for part in first) < dr.square(10 * NEARNESS * planes.index.distance)
     return dr.select(of_cone, mi.UInt32(rows_of_cone - 1), mi.UInt32(rows - 1))
 
 
@@ -173,7 +173,7 @@ def check_vertices(medium: Medium, lights: Sequence[Light]) -> None:
 def sum_in_media(
     view: View,
     media: BoundedRays,
-    index: PlaneIndex,
+    planes: PaperPlanes,
     rays: RayPlanes,
     *,
     rows: int,
@@ -184,9 +184,9 @@ def sum_in_media(
 ):
     """Return the radiance of one light in all bounded media, with Gamma at vertices [W/(m^2 sr)].
 
-    `view`, `media`: the frame, and its rays in the media, with the light; `index`, `rays`: the planes and the rays;
-    `rows`, `cone`: see `realtime.methods.shadow_planes.published_mesh.mesh_gamma`; `order`, `buffer`: see
-    `realtime.methods.shadow_planes.published_crossings.sum_crossings`; `start`: what is in the buffer before, or 0.
+    `view`, `media`: the frame, and its rays in the media, with the light; `planes`, `rays`: the planes and the rays;
+    `rows`, `cone`: see `realtime.methods.published.biri2006.mesh.mesh_gamma`; `order`, `buffer`: see
+    `realtime.methods.published.biri2006.crossings.sum_crossings`; `start`: what is in the buffer before, or 0.
     """
     triangle = visible_triangle(view)
     Color, total = type(view.medium.albedo), start
@@ -199,12 +199,12 @@ def sum_in_media(
         own = replace(media, pieces=(_alone(media, piece, begin),))
 
         def at(x, own=own, factor=factor, meets=meets):
-            return dr.select(meets, factor * own.radiance(own.published_gamma(x)), 0)
+            return dr.select(meets, factor * own.radiance(gamma_in(own, x)), 0)
 
         def at_vertex(point, number=number):
             return _vertex_gamma(view, media, number, point)
 
-        on_planes = mesh_gamma(index, media.light, at_vertex, rows=rows, cone=cone)
+        on_planes = mesh_gamma(planes, media.light, at_vertex, rows=rows, cone=cone)
 
         def at_plane(plane, ray, x, on_planes=on_planes, factor=factor):
             return factor * on_planes(plane, ray, x)
@@ -217,14 +217,14 @@ def sum_in_media(
 
         entry = Entry(begin, at(begin))
         gammas = at_plane, at_end
-        total, _ = sum_crossings(index, rays, end, gammas, order=order, buffer=buffer, start=total, entry=entry)
+        total, _ = sum_crossings(planes, rays, end, gammas, order=order, buffer=buffer, start=total, entry=entry)
     return total
 
 
 def _alone(media: BoundedRays, piece: Piece, begin) -> Piece:
     """Return a piece without what absorbs before it; the published forms continue it without end."""
     none = tuple(type(begin)(0) for _ in piece.before)
-    end = piece.end if media.form == "exact" else type(begin)(dr.inf)
+    end = piece.end if not isinstance(media, ConstantRays) else type(begin)(dr.inf)
     return replace(piece, begin=begin, end=end, before=none)
 
 
@@ -236,9 +236,9 @@ def _vertex_gamma(view: View, media: BoundedRays, number: int, point) -> Any:
     rays = view.medium.rays(view.origin, direction)
     piece = camera_pieces(view.medium, rays)[number]
     begin = piece.begin
-    if media.form != "exact":
+    if isinstance(media, ConstantRays):
         toward = view.medium.bounded_media[number].centre - view.origin
         begin = dr.select(dr.isfinite(begin), begin, dr.maximum(dr.dot(toward, direction), 0))
     geometry = ray_geometry(view.origin, direction, media.light)
     own = replace(media, rays=rays, geometry=geometry, pieces=(_alone(media, piece, begin),))
-    return own.radiance(own.published_gamma(distance))
+    return own.radiance(gamma_in(own, distance))

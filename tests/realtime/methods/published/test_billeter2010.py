@@ -11,9 +11,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from airlight.realtime.methods.light_volumes.published.mesh import VolumeMesh, volume_mesh
-from airlight.realtime.methods.light_volumes.published.raster import signed_crossings
-from airlight.realtime.methods.light_volumes.published.tessellation import (
+from airlight.realtime.methods.published.billeter2010.mesh import VolumeMesh, volume_mesh
+from airlight.realtime.methods.published.billeter2010.raster import signed_crossings
+from airlight.realtime.methods.published.billeter2010.tessellation import (
     RING,
     _first_corner,
     _ring_offset,

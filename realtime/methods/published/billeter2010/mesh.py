@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from airlight.realtime.errors import InputError
-from airlight.realtime.methods.light_volumes.published.tessellation import divide, edges, triangles
+from airlight.realtime.methods.published.billeter2010.tessellation import divide, edges, triangles
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, inverse_depth
 
@@ -44,7 +44,7 @@ def volume_mesh(
 
     `shadow_map`: shadow map of the light; `light`: a point or spot light; `tessellation`: ``static``: two triangles a
     texel; ``adaptive``: larger ones where the map is flat (see
-    `realtime.methods.light_volumes.published.tessellation`); `threshold`: for ``adaptive``: departure from the map that
+    `realtime.methods.published.billeter2010.tessellation`); `threshold`: for ``adaptive``: departure from the map that
     is allowed, relative to the depth. Raises InputError if `tessellation` or `threshold` is none, or a surface touches
     the light.
     """

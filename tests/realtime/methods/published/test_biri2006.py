@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-import airlight.realtime.methods.shadow_planes.published_mesh as module
+import airlight.realtime.methods.published.biri2006.mesh as module
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.loading import load_scene
@@ -21,18 +21,18 @@ from tests.helpers.scenes import bounded_medium, clear_scene, tiny_scene
 def frame(parameters):
     """A frame of the sphere under the spot."""
     scene = load_scene("sphere-spot", (64, 48)).scene
-    return render_frame(prepared(read_scene(scene), configuration("shadow-planes", None, parameters)))
+    return render_frame(prepared(read_scene(scene), configuration("shadow-planes-2006", None, parameters)))
 
 
 def test_many_edges_are_the_cone_itself_and_fewer_are_darker_by_the_square(variant):
     """A regular polygon has the fraction 1 - (2 pi / N)^2 / 6 of its circle: four times the edges, a sixteenth."""
-    whole = frame({}).airlight
-    missing = [1 - frame({"cone": sides}).airlight.mean() / whole.mean() for sides in (16, 64, 4096)]
+    whole = frame({"order": "exact"}).airlight
+    missing = [1 - frame({"order": "exact", "cone": sides}).airlight.mean() / whole.mean() for sides in (16, 64, 4096)]
     assert 0.01 < missing[0] < 0.05
     # The 3072 pixels and the sphere's shadow in the middle leave a fraction of it to chance.
     assert missing[0] / missing[1] == pytest.approx(16, rel=0.2)
     assert abs(missing[2]) < 1e-5
-    many = frame({"cone": 4096})
+    many = frame({"order": "exact", "cone": 4096})
     # (2 pi / 4096)^2 / 6 = 4e-7 of the cone's section; rays along its edge see more of that, and float32 adds 1e-5.
     np.testing.assert_allclose(many.airlight, whole, rtol=1e-3, atol=1e-4 * whole.mean())
 
@@ -54,7 +54,7 @@ def test_a_cone_is_meshed_from_the_light_to_the_camera(variant, monkeypatch):
 # Bounded media, and the buffer ---------------------------------------------------------------------------------------
 
 
-render = partial(frames.render, method="shadow-planes", precision="double")
+render = partial(frames.render, method="shadow-planes-2006", precision="double")
 
 
 def occluder(centre=(0.55, 0.2, 1.35), radius=0.28):
@@ -102,11 +102,11 @@ def test_the_buffer_holds_surfaces_and_all_lights_pass_by_pass(variant):
 def test_vertices_in_a_medium_converge_to_pixels(variant, monkeypatch):
     """One convex occluder before a sphere of fog."""
     scene = clear_scene(ball=fog((0.1, 0.0, 0.4), 0.8), occluder=occluder())
-    pixel = render(scene, media="exact").airlight
+    pixel = render(scene, order="exact").airlight
     errors = []
     for rows, ratio in ((16, 1.5), (64, 1.5**0.25)):
         monkeypatch.setattr(module, "RATIO", ratio)
-        vertex = render(scene, evaluation="vertex", rows=rows).airlight
+        vertex = render(scene, order="exact", evaluation="vertex", rows=rows).airlight
         # Three pixels see the occluder: Gamma on its own triangles is not that of finer planes.
         differences = np.sort(np.abs(vertex - pixel).max(axis=-1).ravel())[:-3]
         errors.append(np.sqrt(np.mean(differences**2)) / pixel.mean())
@@ -120,6 +120,14 @@ def test_without_occluders_in_view_a_medium_is_its_end_less_its_entry(variant):
     """Two media, one before the other: Gamma at exit and entry, and what absorbs before as a factor of the ray."""
     media = {"ball": fog((0.1, -0.9, 0.7), 0.4), "behind": fog((0.2, 0.9, 0.8), 0.5, sigma=0.6)}
     scene = clear_scene(**media, occluder=occluder(centre=(0.3, 0.1, -30.0)))
-    pixel = render(scene, kernel="taylor").airlight
-    vertex = render(scene, kernel="taylor", evaluation="vertex", order="paper").airlight
+    pixel = render(scene, kernel="taylor", media="paper").airlight
+    vertex = render(scene, kernel="taylor", media="paper", evaluation="vertex").airlight
     assert relative_rmse(vertex, pixel) < 1e-6
+
+
+def test_ambient_light_is_added_by_its_formula(variant):
+    scene = tiny_scene()
+    without, with_it = (render(scene, ambient=each) for each in (0.0, 0.23))
+    depth = 0.31 * np.minimum(without.distance, 1e30)
+    expected = 0.23 * np.array([0.9, 0.8, 0.7]) * (1 - np.exp(-depth))[..., None]
+    assert with_it.airlight - without.airlight == pytest.approx(expected, rel=1e-5)
