@@ -21,7 +21,7 @@ from PIL import Image, ImageDraw
 
 from airlight.analytic.errors import InputError, nearest
 from airlight.realtime.frame.samples import render_samples
-from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.methods.registry import METHODS, PUBLISHED_METHODS
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.storage.files import temporary_folder, write_bytes, write_text
 from airlight.reports.data.records import read_report
@@ -123,7 +123,8 @@ def pictures() -> Iterator[Picture]:
     """Yield all pictures, in the order in which they are made."""
     yield from map(scene_picture, SCENES)
     for method in METHODS:
-        yield from method_pictures(method)
+        if method not in PUBLISHED_METHODS:
+            yield from method_pictures(method)
     for name, (scene, changes) in _VIEWS.items():
         yield Picture(name, "method", scene, "cloud-collectors", changes=changes)
     yield Picture("strip", "strip", STRIP[0])

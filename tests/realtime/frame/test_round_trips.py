@@ -18,7 +18,7 @@ import airlight.realtime.numerics.array_types as array_types
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.kernels.registry import KERNELS
-from airlight.realtime.methods.registry import METHODS
+from airlight.realtime.methods.registry import FOG_METHODS, METHODS
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reports.machine.environment import activate
 from tests.helpers.clouds import cloud_scene
@@ -181,7 +181,7 @@ def waits_of_frames(scene: dict[str, Any], method: str) -> dict[str, Counter[str
 @pytest.mark.slow
 @pytest.mark.claim("no-wait-in-a-frame")
 @pytest.mark.parametrize("scene", scenes())
-@pytest.mark.parametrize("method", [name for name, method in METHODS.items() if not method.renders_clouds])
+@pytest.mark.parametrize("method", [*FOG_METHODS, "equi-angular"])
 def test_a_frame_waits_for_the_host_where_the_table_says(elsewhere, method, scene):
     moves, where, counts = WAITS.get(method, ((), "", {}))
     expected = {name: {where: counts[scene]} if name in moves and scene in counts else {} for name in MOVES}

@@ -23,13 +23,15 @@ from tests.helpers.kinds import HEIGHT, KINDS, WIDTH, write_kind
 
 FOG = tuple(name for name in METHODS if not METHODS[name].renders_clouds)
 CLOUDS = tuple(name for name in METHODS if METHODS[name].renders_clouds)
-SUMS = ("unshadowed", "shadow-planes", "light-volumes", "min-max")  # methods that add up lit segments
+#: Methods that add up lit segments.
+SUMS = ("unshadowed", "shadow-planes", "light-volumes", "min-max", "shadow-planes-2006", "light-volumes-2010")
 ESTIMATORS = ("quadrature", "single-scatter", "volpath", "cloud-paths")
 
 #: By kind, the methods and estimators that refuse it, with a word of why.
 _OF_CLOUDS = dict.fromkeys((*CLOUDS, "cloud-paths"), "cloud")
 REFUSED: dict[str, dict[str, str]] = {kind: _OF_CLOUDS for kind in KINDS}
 REFUSED["density grid"] = _OF_CLOUDS | dict.fromkeys(SUMS, "grid")
+REFUSED["bounded media"] = _OF_CLOUDS | {"light-volumes-2010": "bounds"}
 REFUSED["cloud"] = dict.fromkeys(FOG, "sky")
 
 #: The kinds of the default tier.

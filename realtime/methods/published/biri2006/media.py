@@ -86,8 +86,8 @@ class ConstantRays(BoundedRays):
             channels = []
             for before, sigma in zip(piece.before, piece.medium.sigma_t):
                 depth = dr.fma(sigma, distance - piece.begin, before)
-                leg = ConstantLeg(sigma, depth, distance, self.printed)
-                channels.append(sigma * polynomial(self.geometry, x0, x1, self.light, piece.medium.phase, leg))
+                segment = ConstantLeg(sigma, depth, distance, self.printed)
+                channels.append(sigma * polynomial(self.geometry, x0, x1, self.light, piece.medium.phase, segment))
             return piece.medium.albedo * type(self.medium.albedo)(*channels)
 
         segments = self.geometry.smooth_subsegments(self.light, x0, x1)
@@ -123,8 +123,8 @@ def constant_rays(view: View, light: Light, kernel: Kernel | None, form: str) ->
         # A polynomial must refuse here, not in a branch. Dr.Jit computes no value that nobody reads.
         zero = type(geometry.height)(0)
         for bounded in medium.bounded_media:
-            leg = ConstantLeg(bounded.medium.sigma_t[0], zero, bounded.mean_distance, printed)
-            polynomial(geometry, zero, zero, light, bounded.medium.phase, leg)
+            segment = ConstantLeg(bounded.medium.sigma_t[0], zero, bounded.mean_distance, printed)
+            polynomial(geometry, zero, zero, light, bounded.medium.phase, segment)
     pieces = camera_pieces(medium, view)
     return ConstantRays(medium, light, view, geometry, kernel, pieces, printed, polynomial)
 
