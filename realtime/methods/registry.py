@@ -75,7 +75,7 @@ def find_method(name: str) -> type[Method]:
     InputError
         For an unknown name (the nearest is named), and for what cannot be imported or is no method.
     """
-    # What few frames need is imported where it is.
+    # Shaders and users' methods are imported here, as few frames need them.
     if name in METHODS:
         return METHODS[name]
     from airlight.realtime.methods.shader.source import is_shader

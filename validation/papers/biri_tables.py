@@ -24,7 +24,7 @@ from airlight.validation.study.frame_times import moved_light
 _COMPARED = (320, 240)  # size of the frames that are compared: the default report keeps these references [pixels]
 _SECONDS = 0.1  # for each timing [s]
 
-#: What the paper has at once, beside its polynomial and the cone of a spot.
+#: All that the paper has at once, beside its polynomial and the cone of a spot.
 AS_PUBLISHED: Mapping[str, Any] = {"order": "paper", "evaluation": "vertex", "buffer": "8bit", "media": "paper"}
 
 #: By the name of its figures a scene that stands for one of the paper, its size [pixels], and the edges of the paper's

@@ -67,7 +67,7 @@ def paper_planes(
     towards_camera
         Whether they come in the paper's order; otherwise as rays cross them.
     ring
-        Of a spot whose cone is an occluder, see `cone_ring`.
+        The `cone_ring` of a spot whose cone is an occluder.
     """
     basis = light_basis(light, camera)
     layers = layers_between(occluders, light, basis, used=used)
