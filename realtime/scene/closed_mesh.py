@@ -148,7 +148,7 @@ def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
     vertices, faces = mesh_triangles(shape)
     faces = faces[:, ::-1] if shape.has_flipped_normals() else faces
     mesh = closed_mesh(name, vertices, faces)
-    return mesh_bounds(name, vertices, faces, mesh), mesh
+    return mesh_bounds(mesh), mesh
 
 
 def _read_sphere(shape) -> Bounds:
@@ -164,41 +164,47 @@ def _read_sphere(shape) -> Bounds:
     )
 
 
-def mesh_bounds(name: str, vertices: Array, faces: NDArray[Any], mesh: ClosedMesh | None = None) -> Bounds | None:
-    """Return the bounds that the mesh `name` describes, None where it is not convex.
+def mesh_bounds(mesh: ClosedMesh) -> Bounds | None:
+    """Return the bounds that a mesh describes, None where it is not convex.
 
-    `name`: for messages; `vertices`: positions [m], (vertices, 3); `faces`: vertex numbers, counter-clockwise seen from
-    outside, (faces, 3); `mesh`: the same as `closed_mesh` returns it, if it is known. Raises InputError for a mesh that
-    is not closed, inside out or flat.
+    Raises InputError for a mesh that is inside out or flat.
     """
     from scipy.spatial import ConvexHull
 
-    mesh = mesh or closed_mesh(name, vertices, faces)
-    corners = vertices[faces]
-    size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    volume = np.sum((corners[:, 0] - vertices.mean(axis=0)) * area) / 6
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    size, centre = float(np.linalg.norm(high - low)), 0.5 * (low + high)
+
+    # The body is the sum of the tetrahedra from its centre to its triangles.
+    a, b, c = np.moveaxis(mesh.corners - centre, 1, 0)
+    volume = np.sum(a * np.cross(b, c)) / 6
     if not abs(volume) > FLAT * size**3 * 1e-3:
-        raise _refusal(name, "has no volume", "a closed mesh around a body")
+        raise _refusal(mesh.name, "has no volume", "a closed mesh around a body")
     if volume < 0:
         flaw = f"is inside out, at {mesh.edge_words(*mesh.faces[0, :2])}"
-        raise _refusal(name, flaw, _OUTWARDS)
-    # Around the middle of the body, so that the hull adds no rounding of its own.
-    centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-    rounding = _ROUNDING * float(np.abs(vertices).max())
+        raise _refusal(mesh.name, flaw, _OUTWARDS)
+
+    # The hull is made around the centre, so that it adds no rounding. Qhull repeats the plane of each facet for all
+    # triangles that it divides the facet into.
+    rounding = _ROUNDING * float(np.abs(mesh.vertices).max())
     hull = ConvexHull(mesh.vertices - centre, qhull_options=f"Qt C{rounding:g}")
-    # Qhull repeats the plane of each facet for all triangles that it divides the facet into.
     planes, plane = np.unique(hull.equations, axis=0, return_inverse=True)
     if not _on_surface(mesh, hull.simplices, planes, centre, max(FLAT * size, rounding)):
         return None
+
+    # Triangles of the hull that share an edge and lie in different planes make these planes neighbours.
     plane = plane.reshape(-1)
     beside = plane[hull.neighbors]
     pairs = np.unique((plane[:, None] * len(planes) + beside)[beside != plane[:, None]])
-    neighbours = np.column_stack(np.divmod(pairs, len(planes)))
     normals = planes[:, :3]
-    radius = float(np.linalg.norm(vertices - centre, axis=1).max())
-    offsets = normals @ centre - planes[:, 3]
-    return Bounds(name, normals, offsets, corners, centre, radius, neighbours)
+    return Bounds(
+        mesh.name,
+        normals,
+        offsets=normals @ centre - planes[:, 3],
+        corners=mesh.corners,
+        centre=centre,
+        radius=float(np.linalg.norm(mesh.vertices - centre, axis=1).max()),
+        neighbours=np.column_stack(np.divmod(pairs, len(planes))),
+    )
 
 
 def _on_surface(mesh: ClosedMesh, simplices: NDArray[Any], planes: Array, centre: Array, depth: float) -> bool:

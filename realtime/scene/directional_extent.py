@@ -4,13 +4,12 @@
 Light enters there before all shapes, and leaves through the same rectangle behind the media. Heights above that end are
 small numbers where depths may be large ones, so its middle stands for the place of the light.
 
-The media lie in the hull of some spheres: the corners of media of few planes and of meshes that are not convex, which
-are spheres of radius 0, and the spheres about the others. Seen along the light their rectangle is wanted at the angle
-at which it has the least area.
+The media lie in the hull of some spheres: the corners of the hull of meshes, which are spheres of radius 0, and media
+that are spheres. Without media that end somewhere the spheres are those about the shapes. Seen along the light the
+rectangle about them is turned by the angle at which it has the least area.
 """
 
 from collections.abc import Sequence
-from itertools import combinations
 from typing import Any
 
 import drjit as dr
@@ -19,35 +18,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array
-from airlight.realtime.scene.closed_mesh import ClosedMesh
 from airlight.realtime.scene.lights import DirectionalExtent
-from airlight.realtime.scene.media.light_paths import BoundedMedium
+from airlight.realtime.scene.mesh_adjacency import mesh_triangles
 
 Array = NDArray[np.float64]
 
-_FEW_PLANES = 12  # of which every three are met
 _ANGLES = 90  # that are tried, in a quarter of a turn
 _BITS = 14  # of the numbers of a sphere
 _BORDER = 0.05  # of the size of all shapes
 _MARGIN = 1.001  # so that rounding leaves nothing outside
 
 
-def media_spheres(bounded_media: tuple[BoundedMedium, ...]) -> Array:
-    """Return spheres whose hull holds bounded media: middles and radii [m], (spheres, 4).
+def media_spheres(boundaries: Sequence[Any]) -> Array:
+    """Return spheres whose hull holds what Mitsuba's shapes bound: middles and radii [m], (spheres, 4).
 
     Numbers are rounded, and the spheres grown by as much: what the precision of the media puts in their last digits
     must not move the rays of a map.
     """
-    return _rounded(np.concatenate([_spheres(bounded_medium) for bounded_medium in bounded_media]))
-
-
-def mesh_spheres(meshes: Sequence[ClosedMesh]) -> Array:
-    """Return spheres whose hull holds meshes, as `media_spheres` does: the corners of their convex hull."""
     from scipy.spatial import ConvexHull
 
-    vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    corners = vertices[ConvexHull(vertices).vertices]
-    return _rounded(np.column_stack([corners, np.zeros(len(corners))]))
+    spheres = [_sphere_about(shape, touching=True) for shape in boundaries if not shape.is_mesh()]
+    meshes = [mesh_triangles(shape)[0] for shape in boundaries if shape.is_mesh()]
+    if meshes:
+        vertices = np.concatenate(meshes)
+        corners = vertices[ConvexHull(vertices).vertices]
+        spheres.append(np.column_stack([corners, np.zeros(len(corners))]))
+    return _rounded(np.vstack(spheres))
 
 
 def shape_spheres(shapes) -> Array:
@@ -56,13 +52,16 @@ def shape_spheres(shapes) -> Array:
     They are larger than the shapes by a twentieth of them all: at the border of a map nothing stands, so that what lies
     beyond it is lit.
     """
-    spheres = []
-    for shape in shapes:
-        low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
-        spheres.append([*(0.5 * (low + high)), 0.5 * float(np.linalg.norm(high - low))])
-    found = np.array(spheres or [[0.0, 0.0, 0.0, 1.0]])
-    size = np.ptp(found[:, :3], axis=0).max() + found[:, 3].max()
-    return _rounded(found + np.array([0, 0, 0, _BORDER * size]))
+    spheres = np.array([_sphere_about(shape) for shape in shapes] or [np.array([0.0, 0.0, 0.0, 1.0])])
+    size = np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()
+    return _rounded(spheres + np.array([0, 0, 0, _BORDER * size]))
+
+
+def _sphere_about(shape: Any, *, touching: bool = False) -> Array:
+    """Return the sphere about the box of a shape, (4,) [m]; `touching`: the one inside, which is a sphere itself."""
+    low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
+    width = (high - low).max() if touching else np.linalg.norm(high - low)
+    return np.append(0.5 * (low + high), 0.5 * width)
 
 
 def _rounded(spheres: Array) -> Array:
@@ -77,11 +76,8 @@ def distance_before(spheres: Array, shapes) -> float:
     within the sphere about the box.
     """
     middle = _middle(spheres)
-    reach = np.linalg.norm(spheres[:, :3] - middle, axis=1) + spheres[:, 3]
-    for shape in shapes:
-        low, high = (np.array(corner, dtype=np.float64).ravel() for corner in (shape.bbox().min, shape.bbox().max))
-        sphere = np.linalg.norm(0.5 * (low + high) - middle) + 0.5 * np.linalg.norm(high - low)
-        reach = np.append(reach, sphere)
+    everything = np.vstack([spheres, *(_sphere_about(shape) for shape in shapes)])
+    reach = np.linalg.norm(everything[:, :3] - middle, axis=1) + everything[:, 3]
     return float(np.float32(_MARGIN * reach.max()))
 
 
@@ -117,41 +113,27 @@ def _middle(spheres: Array) -> Array:
     return 0.5 * ((centres - radii).min(axis=0) + (centres + radii).max(axis=0))
 
 
-def _least_rectangle(axis: Array, points: Array, radii: Array):
-    """Return half the sides of the rectangle of least area, two vectors, and its middle."""
+def _least_rectangle(axis: Array, points: Array, radii: Array) -> tuple[Array, Array, Array]:
+    """Return half the sides of the rectangle of least area across an axis, and its middle; all (3,) [m]."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
     second = np.cross(axis, first)
-    best: Any = None
-    for angle in np.linspace(0, 0.5 * np.pi, _ANGLES, endpoint=False):
-        sides = np.cos(angle) * first + np.sin(angle) * second, np.cos(angle) * second - np.sin(angle) * first
-        ends = [((points @ side - radii).min(), (points @ side + radii).max()) for side in sides]
-        area = (ends[0][1] - ends[0][0]) * (ends[1][1] - ends[1][0])
-        if best is None or area < best[0] * (1 - 1e-9):
-            best = area, sides, ends
-    _, sides, ends = best
-    across, up = (side * (0.5 * _MARGIN * (high - low)) for side, (low, high) in zip(sides, ends))
-    return across, up, sum(side * (0.5 * (low + high)) for side, (low, high) in zip(sides, ends))
 
+    # By angle the directions of one side, and behind them those of the other, a quarter of a turn ahead.
+    angle = np.linspace(0, 0.5 * np.pi, _ANGLES, endpoint=False)[:, None]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    sides = np.concatenate([cosine * first + sine * second, cosine * second - sine * first])
+    along = points @ sides.T
+    low, high = (along - radii[:, None]).min(axis=0), (along + radii[:, None]).max(axis=0)
+    width = high - low
+    area = width[:_ANGLES] * width[_ANGLES:]
+    # The first of equal areas: what rounds must not choose between them.
+    least = int(np.argmax(area <= area.min() * (1 + 1e-9)))
 
-def _spheres(bounded_medium: BoundedMedium) -> Array:
-    """Return the corners of a bounded medium of few planes, or its sphere."""
-    centre, radius = np.array(bounded_medium.centre, dtype=np.float64).ravel(), float(bounded_medium.radius[0])
-    whole = np.array([[*centre, radius]])
-    if bounded_medium.planes is None or bounded_medium.count > _FEW_PLANES:
-        return whole
-    planes = np.array(bounded_medium.planes, dtype=np.float64).reshape(-1, 4)
-    normals, offsets = planes[:, :3], planes[:, 3] + planes[:, :3] @ centre
-    corners = []
-    for three in combinations(range(bounded_medium.count), 3):
-        matrix = normals[list(three)]
-        # Planes that are nearly parallel meet far away, if anywhere.
-        if abs(np.linalg.det(matrix)) > 1e-6:
-            point = np.linalg.solve(matrix, offsets[list(three)])
-            if np.all(normals @ point < offsets + 1e-4 * radius):
-                corners.append([*point, 0.0])
-    return np.array(corners) if len(corners) >= 4 else whole
+    chosen = [least, least + _ANGLES]
+    across, up = sides[chosen] * (0.5 * _MARGIN * width[chosen])[:, None]
+    return across, up, 0.5 * (low + high)[chosen] @ sides[chosen]
 
 
 def _vector(values, types: ArrayTypes):

@@ -25,7 +25,6 @@ from airlight.realtime.scene.directional_extent import (
     directional_fields,
     distance_before,
     media_spheres,
-    mesh_spheres,
     shape_spheres,
 )
 from airlight.realtime.scene.lights import Light, spot_fields
@@ -135,7 +134,7 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
         raise InputError(
             "the scene has no light; expected at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
-    bodies = _Bodies(medium, meshes, opaque)
+    bodies = _Bodies(medium, meshes, boundaries, opaque)
     behind = backgrounds(scene, clouds=medium.clouds is not None)
     lights = tuple(
         _read_directional(emitter, bodies, types)
@@ -166,14 +165,12 @@ class _Bodies:
 
     medium: Medium
     meshes: tuple[ClosedMesh, ...]  #: bounds of media that are not all convex
-    opaque: list[Any]  #: Mitsuba's shapes
+    boundaries: list[Any]  #: Mitsuba's shapes around bounded media
+    opaque: list[Any]  #: Mitsuba's other shapes
 
     def beam(self, axis, types: ArrayTypes) -> dict[str, Any]:
         """Return the fields of a `Light` from infinity, which travels along a unit vector."""
-        if isinstance(self.medium, HeightFog | GridMedium):
-            spheres = shape_spheres(self.opaque)
-        else:
-            spheres = mesh_spheres(self.meshes) if self.meshes else media_spheres(self.medium.bounded_media)
+        spheres = media_spheres(self.boundaries) if self.boundaries else shape_spheres(self.opaque)
         return directional_fields(axis, spheres, distance_before(spheres, self.opaque), types)
 
 

@@ -11,6 +11,7 @@ from airlight.realtime.numerics.array_types import aligned_array, array_types
 from airlight.realtime.scene.closed_mesh import (
     CELLS,
     Bounds,
+    closed_mesh,
     holds,
     mean_distance,
     mesh_bounds,
@@ -35,7 +36,7 @@ SOLIDS = {
 
 def bounds_of(name):
     vertices, faces = placed(SOLIDS[name], CENTRE, TURN)
-    return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
+    return mesh_bounds(closed_mesh(name, vertices.astype(np.float32).astype(np.float64), faces))
 
 
 @pytest.mark.parametrize("name", ["gem", "ball"])
@@ -65,7 +66,7 @@ BOX_TURN = rotation((0.3, 1.0, 0.2), 27.3)
 
 def bounds_of_mesh(mesh, name="solid"):
     vertices, faces = mesh
-    return mesh_bounds(name, vertices.astype(np.float32).astype(np.float64), faces)
+    return mesh_bounds(closed_mesh(name, vertices.astype(np.float32).astype(np.float64), faces))
 
 
 def sphere_bounds(centre, radius):
