@@ -5,7 +5,6 @@ Names and units are those of DESIGN section 2: lengths in metres, extinction in 
 
 Read in this order:
 
-- `errors.py`: the one exception for what a user gave wrong;
 - `clock.py`: the one stopwatch;
 - `mie.py`: how a sphere scatters light;
 - `droplets.py`: the droplets of clouds and fog, their extinction and phase functions, full and modified;

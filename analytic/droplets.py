@@ -53,8 +53,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.mie import angular_functions, coefficients, intensities, summed, terms
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

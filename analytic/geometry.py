@@ -24,7 +24,7 @@ r^2 - s^2 = h^2.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

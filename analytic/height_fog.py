@@ -41,10 +41,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.kronrod import WIDE
 from airlight.analytic.panels import Panels, Weight, adapted, cut_at_kinks, equal_panels, log_distance
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

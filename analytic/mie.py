@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -32,9 +32,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.kronrod import NARROW, WIDE, Pair
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -38,7 +38,7 @@ from mpmath import mp, mpf
 from numpy.typing import ArrayLike, NDArray
 
 from airlight.analytic.droplets import WATER, Droplets, Modified, Optics, optics
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ adds that to the surfaces. Mitsuba only reads the scene and casts rays. Nothing 
 
 Rooms:
 
-- `errors.py`: the exception for mistakes of the user;
+- `errors.py`: the exceptions for mistakes of the user and for a missing driver;
 - `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
 - `transforms.py`: transforms of Mitsuba's plugins, and which of them lights and spheres cannot have;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;

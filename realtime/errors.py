@@ -1,13 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The exception for mistakes of the user, on the side under test.
+"""Exceptions of the side under test: `InputError` is that of all of airlight."""
 
-`analytic.errors` holds the same class for the side of the reference, since the two sides share no code (DESIGN section
-1). The command line treats both alike.
-"""
-
-
-class InputError(ValueError):
-    """Input that cannot be used. The message says in one line what was given, what is expected and what to do."""
+from airlight.errors import InputError as InputError
 
 
 class NoDriverError(RuntimeError):

@@ -15,14 +15,13 @@ Traceback (most recent call last):
 airlight.realtime.errors.InputError: steps: got 0, expected a whole number of at least 1
 """
 
-import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, dataclass, field, fields
 from numbers import Integral, Real
 from typing import Any
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError, nearest
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
@@ -102,12 +101,6 @@ def read_parameters(
             raise InputError(f"method {method}: got a parameter {name!r}, expected one of: {wanted}{more}")
         converted[name] = _converted(f"method {method}: {name}", value, known[name])
     return kind(**converted)
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """Return '; did you mean X?' for the end of a message about `word`, or an empty string."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.4)
-    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def wanted_values(item: Field) -> str:

@@ -6,13 +6,14 @@ A reader returns the value, or raises InputError with what was given and what is
 
 import csv
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 
 Reader = Callable[[str, Any], Any]
+Value = TypeVar("Value")
 
 
 def read_toml(what: str, path: Path) -> dict[str, Any]:
@@ -102,3 +103,25 @@ def several(read: Reader, least: int = 1) -> Reader:
 def by_name(read: Reader) -> Reader:
     """Return a reader of a table whose values are alike."""
     return lambda what, value: {name: read(f"{what}.{name}", each) for name, each in read_table(what, value).items()}
+
+
+def named_values(option: str, words: Iterable[str], read: Callable[[str], Value], wanted: str) -> dict[str, Value]:
+    """Return values by name from words of the form 'NAME=VALUE'.
+
+    `option`: where the words stand, for messages; `words`: what the user wrote; `read`: returns the value of a text
+    that is not empty, or raises ValueError; `wanted`: what a word should look like, for messages. Raises InputError if
+    a word has another form, or two words give one name different values.
+    """
+    values: dict[str, Value] = {}
+    for word in words:
+        name, _, text = (part.strip() for part in word.partition("="))
+        try:
+            if not name or not text:
+                raise ValueError(word)
+            value = read(text)
+        except ValueError:
+            raise InputError(f"{option}: got {word!r}, expected {wanted}") from None
+        if values.setdefault(name, value) != value:
+            first = next(each.strip() for each in words if each.partition("=")[0].strip() == name)
+            raise InputError(f"{option}: got {first} and {word.strip()}, expected one of them: each name once")
+    return values

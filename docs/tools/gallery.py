@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.realtime.frame.samples import render_samples
 from airlight.realtime.methods.registry import METHODS, PUBLISHED_METHODS
 from airlight.realtime.scene.read_scene import read_scene

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.files import write_text
 from airlight.reports.data.records import read_json, read_report
 from airlight.reports.machine.environment import activate

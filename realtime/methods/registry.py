@@ -9,10 +9,9 @@ neither clouds nor shaders.
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError, nearest
 from airlight.realtime.methods.history import ENDING, with_history
 from airlight.realtime.methods.interface.method import Method
-from airlight.realtime.parameters import nearest
 
 #: By name, the module in this room and the class.
 _CLASSES: Mapping[str, str] = {

@@ -295,7 +295,7 @@ def user_errors(what: str, file: str | None = None) -> Iterator[None]:
     except (Exception, SystemExit) as error:
         root = root_of(error)  # Dr.Jit wraps what is raised in the body of a loop
         words = " ".join(str(root).split())
-        if isinstance(root, InputError) or type(root).__name__ == InputError.__name__:  # `airlight.InputError` too
+        if isinstance(root, InputError):
             raise InputError(words) from error
         raise InputError(f"{what}: {_place(root, error, file)}{type(root).__name__}: {words}") from error
 

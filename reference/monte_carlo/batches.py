@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -40,7 +40,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches, check_samples, single_batch
 from airlight.reference.scene.clouds import CloudScene
 from airlight.reference.scene.read import ReferenceScene, whole_scene

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.quadrature.fields import field_of
 from airlight.reference.quadrature.ray_values import Progress, RayValues, ReferenceImage, ray_values
 from airlight.reference.quadrature.replicates import (

@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from airlight.reference.scene.directional_light import DirectionalLight, is_directional, read_directional
 from airlight.reference.scene.read import (

@@ -14,8 +14,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
 from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
 from airlight.reference.scene.colours import colour

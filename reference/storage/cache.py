@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.files import NO_SPACE, sweep_hidden, write_bytes
 
 DEFAULT_LIMIT = 4 * 2**30  #: bytes

@@ -22,7 +22,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.files import NO_SPACE, atomic_path
 
 TOTAL = "total"  #: the layer in the plain channels R, G, B

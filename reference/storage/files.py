@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 #: Errors of the system when a disk is full, a quota used up, or a file larger than allowed.
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

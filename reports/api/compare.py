@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from airlight.analytic.errors import InputError, named_values
+from airlight.errors import InputError
 from airlight.reports.api.inputs import (
     File,
     Files,
@@ -25,6 +25,7 @@ from airlight.reports.api.inputs import (
     several,
     telling,
 )
+from airlight.validation.readers import named_values
 
 if TYPE_CHECKING:
     from airlight.reference.storage.exr import Image

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.api.inputs import (
     Files,
     KernelLike,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.build import build
 from airlight.reports.api.inputs import Files, one_error, output_files
 from airlight.reports.tables.record import Result

@@ -14,7 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
+from airlight.realtime.errors import NoDriverError
 from airlight.reports.machine.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -60,23 +61,16 @@ _R = TypeVar("_R")
 
 
 def one_error(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function raise our own exceptions in place of those of `realtime`: `airlight.InputError`, MissingError."""
+    """Let a function raise MissingError, which says what to install, where no driver draws shaders."""
 
     @functools.wraps(function)
     def wrapped(*arguments: _P.args, **named: _P.kwargs) -> _R:
         try:
             return function(*arguments, **named)
-        except Exception as error:  # only these two are changed; naming them here would import `realtime` at each start
-            from airlight.realtime.errors import InputError as RealtimeInputError
-            from airlight.realtime.errors import NoDriverError
+        except NoDriverError as error:
+            from airlight.reports.machine.opengl import missing
 
-            if isinstance(error, RealtimeInputError):
-                raise InputError(str(error)) from error
-            if isinstance(error, NoDriverError):
-                from airlight.reports.machine.opengl import missing
-
-                raise missing(str(error)) from error
-            raise
+            raise missing(str(error)) from error
 
     return wrapped
 

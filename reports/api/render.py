@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.api.inputs import (
     Files,
     KernelLike,

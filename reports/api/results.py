@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import TOTAL, Image
 from airlight.reference.storage.exr import layer as image_layer
 from airlight.reports.data.records import Reference as QuadratureReference

@@ -8,7 +8,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.scene_digest import build_scene
 from airlight.reports.api.inputs import one_error, pixels_of
 from airlight.validation.scenes.bodies import check_bodies

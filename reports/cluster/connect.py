@@ -28,7 +28,7 @@ Place = int | str  #: what `--cluster` names: processes of this machine, or a sc
 
 def parse_place(word: str | None) -> Place:
     """Return the place that a word names; a worker for each processor of this machine for None."""
-    from airlight.analytic.errors import InputError
+    from airlight.errors import InputError
 
     require("distributed", "sweep", "work on several processes or machines")
     word = "local" if word is None else word.strip()
@@ -124,7 +124,7 @@ def _without_interrupts() -> Iterator[None]:
 def _remote(scheduler: str) -> Iterator[Client]:
     from distributed import Client
 
-    from airlight.analytic.errors import InputError
+    from airlight.errors import InputError
 
     given = {"address" if _ADDRESS.fullmatch(scheduler) else "scheduler_file": scheduler}
     try:

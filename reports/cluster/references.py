@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent, stopwatch
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches
 from airlight.reference.quadrature.ray_values import ReferenceImage
 from airlight.reference.storage.store import fresh_results, fresh_since, is_kept, keep

@@ -72,7 +72,7 @@ def run_groups(client: Client, groups: Iterable[Group], *, made: Any = None, ret
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
 
-    from airlight.analytic.errors import InputError
+    from airlight.errors import InputError
 
     topic = f"airlight-{uuid.uuid4().hex[:12]}"
     begun: dict[str, tuple[str, float]] = {}  # by future: which task began last, and when [s]
@@ -181,12 +181,11 @@ def _check(worker: Any, made: Any) -> None:
 
 
 def _outcome(task: Task, *values: Any) -> Outcome:
-    from airlight.analytic.errors import InputError
-    from airlight.realtime.errors import InputError as MethodError
+    from airlight.errors import InputError
 
     try:
         return Outcome(task, "done", task.function(*values, *task.arguments))
-    except (InputError, MethodError) as error:
+    except InputError as error:
         return Outcome(task, "refused", reason=str(error))
     except Exception as error:  # what a task raises is its row's, not the end of the run
         place = traceback.extract_tb(error.__traceback__)[-1]

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.reports.tables.drawing import text_of
 from airlight.reports.tables.record import Said
 from airlight.reports.tables.table import Table, table, words

@@ -22,6 +22,7 @@ import cyclopts
 import docstring_parser
 from cyclopts import App, Group, Parameter
 
+from airlight.errors import InputError
 from airlight.reference.storage.build import build
 from airlight.reports.api.compare import compare
 from airlight.reports.api.explore import describe, view
@@ -279,7 +280,7 @@ def run(arguments: Sequence[str], *, extras: str | None = None) -> int:
         comma = re.search(r'unable to convert "(-?\d+),(\d+)"', said)
         hint = f"; write {comma[1]}.{comma[2]}" if comma else ""
         return _fail(f"{said}{hint} (see `{path} --help`)", WRONG_INPUT)
-    except _input_errors() as error:
+    except InputError as error:
         return _fail(str(error), WRONG_INPUT)
     if not arguments:
         return WRONG_INPUT
@@ -292,12 +293,6 @@ def _at_home(word: str) -> str:
     if word.startswith("~"):
         return os.path.expanduser(word)
     return f"{option}={os.path.expanduser(value)}" if option.startswith("-") and equals else word
-
-
-def _input_errors() -> tuple[type[Exception], ...]:
-    """Return both classes for the user's mistakes, as far as they were imported: `analytic` imports NumPy."""
-    modules = (sys.modules.get(name) for name in ("airlight.analytic.errors", "airlight.realtime.errors"))
-    return tuple(module.InputError for module in modules if module is not None)
 
 
 def _fail(message: str, status: int) -> int:

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path, PureWindowsPath
 from typing import Any, get_args, get_type_hints
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.build import Build
 from airlight.validation.columns import column, described, record_of
 from airlight.validation.kernels.records import Stability

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.data.records import Report, Scene
 from airlight.reports.diff.times import Finding, TimeComparison, compare_times
 from airlight.reports.report.claims import confirmed

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.reference.storage.exr import layer as image_layer
 from airlight.reference.storage.exr import read_exr
 from airlight.reference.storage.files import write_text

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 from airlight.reference.scene.varying import GridMedium, HeightMedium
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.transforms import matrix_of
 
 Array = NDArray[np.float64]

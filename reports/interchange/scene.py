@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.area_light import ReferenceAreaLight
 from airlight.reference.scene.camera import camera_matrix

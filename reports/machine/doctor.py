@@ -163,7 +163,7 @@ def doctor(*, clear_cache: bool = False) -> Doctor:
 
 def _cache(*, clear: bool) -> Cache:
     """Return how much is cached, after everything is removed where that is asked for."""
-    from airlight.analytic.errors import InputError
+    from airlight.errors import InputError
     from airlight.reference.storage.cache import cache_entries, cache_folder, cache_limit, clear_cache
 
     folder = cache_folder()

@@ -144,7 +144,7 @@ def child_environment(variant: str | None = None) -> dict[str, str]:
 
 def check_variant(variant: str) -> None:
     """Raise InputError for a variant that is not one of `VARIANTS`."""
-    from airlight.analytic.errors import InputError, nearest
+    from airlight.errors import InputError, nearest
 
     if variant not in VARIANTS:
         raise InputError(

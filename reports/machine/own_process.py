@@ -22,7 +22,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from airlight.analytic.clock import Spent
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.shader.client import LIMIT_VARIABLE, method_limit
 from airlight.reports.machine import quick_compilation
 from airlight.reports.machine.environment import child_environment
@@ -136,7 +136,6 @@ def main() -> None:
     from airlight.reports.machine.environment import MissingError, activate
 
     activate()
-    from airlight.realtime.errors import InputError as MethodError
     from airlight.realtime.errors import NoDriverError
     from airlight.reference.storage.store import counted
 
@@ -161,7 +160,7 @@ def main() -> None:
                 answer("ended", None)
             else:
                 answer("value", result)
-        except (InputError, MethodError, MissingError, NoDriverError) as error:
+        except (InputError, MissingError, NoDriverError) as error:
             answer("raised", type(error)(str(error)))  # its cause may not be one that can be sent
     _end_group()  # not waiting for what the user's code has started
 

@@ -43,7 +43,7 @@ def is_asked_for() -> bool:
     """Return whether the environment asks for quick compilation."""
     value = os.environ.get(VARIABLE) or "full"
     if value not in ("quick", "full"):
-        from airlight.analytic.errors import InputError
+        from airlight.errors import InputError
 
         raise InputError(f"{VARIABLE}: got {value!r}, expected quick, or full as without it")
     return value == "quick"

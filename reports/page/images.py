@@ -38,7 +38,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import TOTAL, read_exr
 from airlight.reports.data.records import Scene
 from airlight.validation.metrics.errors import FLOOR

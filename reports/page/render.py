@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.data.records import Method, Report, Scene
 from airlight.reports.page.chart import scene_chart, speed_error_chart
 from airlight.reports.page.filters import FILTERS, KINDS, MARKS, TABLES, kept_words, trust_words, viewer_words

@@ -16,7 +16,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 #: Least difference of any two `COLOURS` in CIEDE2000, under normal sight and without one kind of cones.
 LEAST_DIFFERENCE = 10.0

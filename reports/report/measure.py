@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from airlight.analytic.clock import stopwatch
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as MethodError
+from airlight.errors import InputError
 from airlight.realtime.methods.shader.source import is_shader
 from airlight.reference.storage.files import NO_SPACE, alone, ensure_folder
 from airlight.reference.storage.store import Kept, date, fresh_results
@@ -200,7 +199,7 @@ def _try_own(scene: str, study: Study, apart: Apart | None) -> dict[Configuratio
         cell = Cell(scene, PROBE, (), chosen)
         try:
             _ = frame_of(cell) if apart is None else apart(frame_of, cell, name=chosen.method)
-        except (InputError, MethodError) as error:
+        except InputError as error:
             fault = own_fault(chosen.method, str(error))
             if fault and apart is None:
                 raise InputError(fault) from error

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.api.inputs import Progress, Words, one_error, several, telling
 from airlight.reports.studies.registry import Study
 from airlight.reports.tables.table import Column, Table, numbers, table, words

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.api.inputs import (
     Methods,
     Progress,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.api.inputs import (
     Kernels,
     Methods,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.reports.tables.record import Said
 
 if TYPE_CHECKING:

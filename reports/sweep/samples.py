@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.columns import plain
 from airlight.validation.statistics.samples import quantile_interval
 from airlight.validation.study.row import COLUMNS, FRAME_MS, NO_REFERENCE, PROPERTY, STATUSES

@@ -36,7 +36,7 @@ def print_json(data: Any) -> None:
     try:
         text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
     except ValueError:
-        from airlight.analytic.errors import InputError
+        from airlight.errors import InputError
 
         raise InputError("a result is not finite, and is not printed; a number of the input may be too large") from None
     try:

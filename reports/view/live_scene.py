@@ -15,8 +15,7 @@ from typing import Any
 import drjit as dr
 
 from airlight.analytic.clock import stopwatch
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as MethodError
+from airlight.errors import InputError
 from airlight.realtime.frame.incremental import FrameCache, next_frame
 from airlight.realtime.frame.renderer import Frame, FrameRenderer, Stages, image_frame
 from airlight.realtime.methods.registry import find_method
@@ -134,7 +133,7 @@ class LiveScene:
         before, self.chosen = self.chosen, chosen
         try:
             renderer = self._find_renderer()
-        except (InputError, MethodError):
+        except InputError:
             self.chosen = before
             raise
         self._other_method |= renderer is not self.renderer
@@ -171,7 +170,7 @@ class LiveScene:
                 self.changes = wanted
                 self._load()
             renderer = self._find_renderer()
-        except (InputError, MethodError):
+        except InputError:
             self.changes = before
             self._load()  # the numbers of before, bit by bit
             self.renderer = self._find_renderer()

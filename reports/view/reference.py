@@ -180,7 +180,7 @@ def answers(task: Task) -> Iterator[Answer]:
 
 def compute(pipe: Connection, variant: str) -> None:
     """Answer the tasks of a pipe, the newest first and alone; None for nothing to do."""
-    from airlight.analytic.errors import InputError
+    from airlight.errors import InputError
     from airlight.reports.machine.environment import activate
     from airlight.reports.machine.process_start import default_signals
 

@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from airlight.analytic.clock import stopwatch
-from airlight.analytic.errors import InputError, nearest
-from airlight.realtime.errors import InputError as MethodError
+from airlight.errors import InputError, nearest
 from airlight.realtime.methods.interface.method import method_parameters
 from airlight.realtime.methods.registry import METHODS, find_method
 from airlight.realtime.parameters import defaults, values
@@ -178,7 +177,7 @@ class Session:
         self._asked_at = self._asked_at or time.perf_counter()
         try:
             work()
-        except (InputError, MethodError) as error:
+        except InputError as error:
             page.tell("mistake", message=" ".join(str(error).split()))
         else:
             page.tell("mistake", message="")
@@ -288,7 +287,7 @@ class Session:
             if self._factor is None:
                 frame = self.live.on_host(shown)
                 self._factor = exposure(frame.airlight + frame.surface)
-        except (InputError, MethodError) as error:
+        except InputError as error:
             page.tell("mistake", message=" ".join(str(error).split()))
             self._wanted, self._show["run"], self._asked_at = 0, False, None
             self._last_judged = self._sent  # what is shown is no frame of the scene as it is
@@ -346,7 +345,7 @@ class Session:
         # A change that no frame shows yet has another reference.
         new = self._sent > self._last_judged and self._asked_at is None
         if self._judged is None and self._shown is not None and new:
-            with suppress(InputError, MethodError):
+            with suppress(InputError):
                 self._last_judged, self._judged = self._sent, self.live.on_host(self._shown).airlight
                 self.reference.start(self._given.scene, self._given.size, self.live.changes, _IN_MOTION)
 
@@ -357,7 +356,7 @@ class Session:
             return
         try:
             frame, mean = (self.live.on_host(each) for each in (shown, self.live.mean(shown)))
-        except (InputError, MethodError) as mistake:
+        except InputError as mistake:
             page.tell("error", failure=" ".join(str(mistake).split()))
             return
         error, left = (view_error(found, each.airlight) for each in (frame, mean))

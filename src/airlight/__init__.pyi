@@ -3,7 +3,7 @@
 
 __version__: str
 
-from .analytic.errors import InputError as InputError
+from .errors import InputError as InputError
 from .realtime.frame.renderer import frame_renderer as frame_renderer
 from .realtime.frame.renderer import render_frame as render_frame
 from .realtime.kernels.registry import KERNELS as KERNELS

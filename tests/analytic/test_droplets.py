@@ -7,9 +7,9 @@ from mpmath import workdps
 from scipy.special import roots_legendre
 
 from airlight.analytic.droplets import Droplets, Modified, optics
-from airlight.analytic.errors import InputError
 from airlight.analytic.mie import angular_functions, coefficients, efficiencies, intensities
 from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.errors import InputError
 from airlight.validation.certified.files import certified_data
 from airlight.validation.kernels.case_files import integrate_cases, read_cases
 from tests.helpers.hg_draine import hg_draine_moments, legendre_moments

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun, phi
 from airlight.analytic.panels import airlight_segments
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 from tests.helpers.height_fog import drawn, rows
 
 # Height, foot and exponents are rounded: 1e-11 where heights are tens of scale heights, as among these rays.

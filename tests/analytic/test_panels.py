@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.panels import airlight_segments, log_distance
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 from airlight.validation.kernels.case_files import integrate_cases, read_cases
 
 ISOTROPIC = PhaseFunction("isotropic")

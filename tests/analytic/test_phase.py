@@ -5,8 +5,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 
 SMOOTH = [
     PhaseFunction("isotropic"),

@@ -29,7 +29,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

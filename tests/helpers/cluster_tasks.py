@@ -5,7 +5,7 @@ import os
 import re
 import time
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 
 def square(number, seconds=0.0):

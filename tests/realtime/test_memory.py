@@ -6,7 +6,7 @@ import os
 import pytest
 
 import airlight.realtime.memory
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.memory import Memory, check_memory, usable_memory
 
 MACHINE = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

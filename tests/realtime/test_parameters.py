@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.parameters import Parameters, defaults, parameter, read_parameters, values
 
 

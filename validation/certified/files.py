@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 
 FOLDER = Path(__file__).parent
 

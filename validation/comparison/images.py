@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import BATCHES, BOUND, NOTE, TOTAL, Image, layer_names, read_exr
 from airlight.reference.storage.exr import layer as image_layer
 from airlight.validation.arrays import Array, Bools

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import NOTE, Image, read_exr
 from airlight.validation.arrays import Progress
 from airlight.validation.engine.error_place import place_words

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.reference.storage.exr import read_exr
 from airlight.validation.engine.judge import EngineComparison, ReferenceOf, judge_image
 from airlight.validation.engine.seen import AIRLIGHT, SURFACE, judged_layer

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.quadrature.emission import emitted_light
 from airlight.reference.quadrature.ray_values import ReferenceImage
 from airlight.reference.quadrature.surface import surface_hits

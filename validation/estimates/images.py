@@ -23,8 +23,8 @@ from itertools import pairwise
 import numpy as np
 
 from airlight.analytic.clock import stopwatch
-from airlight.analytic.errors import InputError
 from airlight.analytic.geometry import foot_and_height
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, seed_ranges
 from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds
 from airlight.reference.quadrature.ray_values import ReferenceImage

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import LAYERS, combined_moments, parse_seed_ranges, seed_ranges
 from airlight.reference.storage.exr import TOTAL, Attribute, Image
 from airlight.validation.arrays import Array

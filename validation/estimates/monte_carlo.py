@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent, stopwatch
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import LARGEST_SEED, LAYERS, Batches, merged
 from airlight.reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch, set_layers
 from airlight.reference.monte_carlo.cloud_paths.opacity import seen_clouds

@@ -31,8 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.clock import stopwatch
-from airlight.analytic.errors import InputError
 from airlight.analytic.geometry import foot_and_height
+from airlight.errors import InputError
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.ray_values import ReferenceImage
 from airlight.reference.quadrature.replicates import Keep, PointPlan

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from airlight.analytic.clock import stopwatch
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.storage.exr import NOTE, Image
 from airlight.validation.arrays import Array, Bools, Progress

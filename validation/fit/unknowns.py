@@ -26,8 +26,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airlight.analytic.errors import InputError, nearest
 from airlight.analytic.height_fog import HeightFog
+from airlight.errors import InputError, nearest
 from airlight.reference.scene.read import ReferenceScene
 from airlight.validation.engine.fault import Fault, Number, Values
 from airlight.validation.engine.prediction import Guess, Predictor

@@ -17,8 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from airlight.analytic.clock import Spent
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.errors import InputError
 from airlight.realtime.kernels.registry import KERNELS, Kernel
 from airlight.realtime.numerics.array_types import aligned_array
 from airlight.realtime.numerics.recorded import Frozen
@@ -96,7 +95,7 @@ def try_kernel(family: str, size: int | None, *, reference: Cases, rays: Cases) 
     try:
         J = np.array(_frozen(kernel, reference)(), dtype=np.float64)
         work = _frozen(kernel, rays, count)
-    except (InputError, RealtimeInputError) as reason:
+    except InputError as reason:
         return Tried(replace(cost, refused=str(reason)))
     error = errors_by_group(reference, J, "single", {"all": np.ones(len(J), dtype=bool)})["all"]
     cost = replace(cost, median=error.median, p99=error.p99, max=error.max, nonfinite=error.nan + error.infinite)

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.panels import airlight_segments
 from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.errors import InputError
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.readers import read_csv
 

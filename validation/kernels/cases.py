@@ -12,8 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import aligned_array, array_types
 from airlight.realtime.rays import RayGeometry, ray_geometry
 from airlight.realtime.scene.lights import Light
@@ -53,7 +52,7 @@ def evaluate_accepted(
         rows = np.flatnonzero(names == name)
         try:
             results[rows] = evaluate_rows(cases, rows, function, precision, **options)
-        except (InputError, RealtimeInputError) as reason:
+        except InputError as reason:
             refused[name] = reason
     return results, refused
 

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.validation.readers import Reader, by_name, read_list, read_number, read_word
 
 SCHEMA = "airlight-frames/1"

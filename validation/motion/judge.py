@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.camera import film_positions
 from airlight.reference.scene.read import ReferenceScene, read_reference
 from airlight.reference.storage.exr import NOTE, read_exr

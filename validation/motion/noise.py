@@ -44,7 +44,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 from scipy.stats import nct
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import read_exr
 from airlight.validation.arrays import Array, Progress
 from airlight.validation.engine.images import image_times

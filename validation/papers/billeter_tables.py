@@ -18,8 +18,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as RealtimeError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import Frame, FrameRenderer, render_frame
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.validation.arrays import Array
@@ -141,5 +140,5 @@ def attempted(names: tuple[str, ...], work: Callable[[], dict[str, Any]]) -> dic
     """Return the results of a piece of work; where it failed, the reason under each of `names`."""
     try:
         return work()
-    except (InputError, RealtimeError, MemoryError, TimeoutError) as reason:
+    except (InputError, MemoryError, TimeoutError) as reason:
         return dict.fromkeys(names, f"not measured: {str(reason) or 'out of memory'}")

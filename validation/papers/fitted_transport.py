@@ -32,6 +32,7 @@ _ANGLES = 61  # entries of P
 _HORIZON = 5e-4  # cosine of the entry at mu = 0
 _LEAST_D, _LEAST_SUM = 1.01, 1.05
 _FLOOR = 0.02  # of the brightest of a thickness, below which errors count less
+_ROUNDS = 2  # of P and the other functions
 _EVALUATIONS = 12  # of a fit: it then ends within some thousandths, and the form misses T by 10 to 30 %
 _EXPONENTS = (-200, 50)  # of A X, and +-14 of D: without light nothing else bounds them
 _NARROWEST = 1e-3  # of the widths C, in thicknesses
@@ -151,76 +152,71 @@ def _scattering_angles(mu: Array, mu_l: Any, phi: Any) -> Array:
 
 
 def _fit_set(samples: _Samples, *, isotropic: bool) -> FittedRadiance:
-    """Fit one set of orders; P of an `isotropic` one is 1."""
+    """Fit one set of orders: P and the other functions in turns; P of an `isotropic` one is 1."""
     at = np.linspace(0, np.pi, _ANGLES)
     angles = _scattering_angles(samples.mu, samples.mu_l, samples.phi)
-    p = np.ones(_ANGLES)
-    of_directions = np.zeros((_THICKNESSES, _DIRECTIONS, 4))
-    of_suns = np.zeros((_THICKNESSES, _SUNS, 2))
-    model = np.empty_like(samples.T)
-
-    # All but P, with P = 1.
-    for number in range(_THICKNESSES):
-        start = _first_guess(samples, number)
-        of_directions[number], of_suns[number], model[number] = _fit_thickness(
-            samples, number, np.ones_like(angles[number]), start
-        )
-    if isotropic:
-        return FittedRadiance(p, of_directions, of_suns)
-
-    # P takes what is left at each angle, weighted as T is fitted.
-    weight = 1 / samples.scale**2
     bins = np.rint(angles / np.pi * (_ANGLES - 1)).astype(np.int64).ravel()
-    above = np.bincount(bins, (weight * samples.T * model).ravel(), _ANGLES)
-    below = np.bincount(bins, (weight * model**2).ravel(), _ANGLES)
-    hit = below > 0
-    p *= np.interp(at, at[hit], np.maximum(above[hit] / below[hit], 1e-3))
+    weight = 1 / samples.scale**2
+    p = np.ones(_ANGLES)
+    starts = [_first_guess(samples, number) for number in range(_THICKNESSES)]
+    for _ in range(_ROUNDS):
+        # All functions but P, from where they ended.
+        values = np.interp(angles, at, p)
+        fits = [_fit_thickness(samples, number, values[number], start) for number, start in enumerate(starts)]
+        starts = [fit.x for fit in fits]
+        if isotropic:
+            break
 
-    # All but P again, from where they ended.
-    values = np.interp(angles, at, p)
-    for number in range(_THICKNESSES):
-        start = of_directions[number].copy(), of_suns[number]
-        start[0][:, 3] = np.log(np.maximum(start[0][:, 3] - _LEAST_D, 1e-6))
-        of_directions[number], of_suns[number], _ = _fit_thickness(samples, number, values[number], start)
-    return FittedRadiance(p, of_directions, of_suns)
+        # P takes what is left at each angle, weighted as T is fitted.
+        model = np.stack([fit.model for fit in fits])
+        above = np.bincount(bins, (weight * samples.T * model).ravel(), _ANGLES)
+        below = np.bincount(bins, (weight * model**2).ravel(), _ANGLES)
+        hit = below > 0
+        p *= np.interp(at, at[hit], np.maximum(above[hit] / below[hit], 1e-3))
+    return FittedRadiance(p, np.stack([fit.of_directions for fit in fits]), np.stack([fit.of_suns for fit in fits]))
 
 
-def _first_guess(samples: _Samples, number: int) -> tuple[Array, Array]:
-    """Return log A, B1, C, log (D - 1.01) by direction, and log X, B2 by sun, with which a fit begins."""
+def _first_guess(samples: _Samples, number: int) -> Array:
+    """Return log A, B1, C, log (D - 1.01) by direction, then log X, B2 by sun, with which a fit begins."""
     T, t = samples.T[number], float(samples.t[number].flat[0])
     typical = max(float(np.median(T[T > 0])) if (T > 0).any() else 1e-30, 1e-30)
     # A bell far wider than the slab shows no slope in its width, and the evaluations of a fit would leave it so.
-    return np.tile([np.log(typical), t / 3, t / 2, 0.5], (_DIRECTIONS, 1)), np.zeros((_SUNS, 2))
+    return np.append(np.tile([np.log(typical), t / 3, t / 2, 0.5], _DIRECTIONS), np.zeros(2 * _SUNS))
 
 
-def _fit_thickness(samples: _Samples, number: int, p: Array, start: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-    """Fit one thickness, all directions and suns together; return the functions and the modelled T."""
+@dataclass(frozen=True)
+class _Fit:
+    """The functions of one thickness."""
+
+    x: Array  #: with which the next round begins, as `_first_guess`
+    of_directions: Array
+    of_suns: Array
+    model: Array  #: T by these functions
+
+
+def _fit_thickness(samples: _Samples, number: int, p: Array, start: Array) -> _Fit:
+    """Fit one thickness, all directions and suns together."""
     from scipy.optimize import least_squares
 
     t, T, scale = float(samples.t[number].flat[0]), samples.T[number], samples.scale[number]
     d, mu_l = samples.d[number, :, 0, 0, 0], samples.mu_l[number, 0, :, 0, 0]
-    first = _DIRECTIONS * 4
 
-    def positive(log_d: Array) -> Array:
-        return _LEAST_D + np.exp(np.clip(log_d, -14, 14))
+    def tables(x: Array) -> tuple[Array, Array]:
+        of_directions, of_suns = x[: 4 * _DIRECTIONS].reshape(-1, 4).copy(), x[4 * _DIRECTIONS :].reshape(-1, 2)
+        of_directions[:, 2] = np.maximum(np.abs(of_directions[:, 2]), _NARROWEST * t)
+        of_directions[:, 3] = _LEAST_D + np.exp(np.clip(of_directions[:, 3], -14, 14))
+        return of_directions, of_suns
 
     def model(x: Array) -> Array:
-        log_a, b1, c, log_d = x[:first].reshape(-1, 4).T
-        log_x, b2 = x[first:].reshape(-1, 2).T
-        shift, b = positive(log_d), b1 - b2[:, None]
+        of_directions, of_suns = tables(x)
+        log_a, b1, width, shift = of_directions.T
+        log_x, b2 = of_suns.T
+        b = b1 - b2[:, None]
         ratio = np.log(d[:, None, None] + shift) / np.log(np.maximum(b + shift, _LEAST_SUM))
-        width = np.maximum(np.abs(c), _NARROWEST * t)
         exponent = np.clip(log_a + log_x[:, None], *_EXPONENTS) - (d[:, None, None] - b) ** 2 / (2 * width**2)
         return (np.exp(exponent) * ratio * mu_l[:, None])[..., None] * p
 
     fitted = least_squares(
-        lambda x: ((model(x) - T) / scale).ravel(),
-        np.concatenate([each.ravel() for each in start]),
-        method="trf",
-        max_nfev=_EVALUATIONS,
-        x_scale="jac",
+        lambda x: ((model(x) - T) / scale).ravel(), start, method="trf", max_nfev=_EVALUATIONS, x_scale="jac"
     )
-    of_directions, of_suns = fitted.x[:first].reshape(-1, 4).copy(), fitted.x[first:].reshape(-1, 2)
-    of_directions[:, 2] = np.maximum(np.abs(of_directions[:, 2]), _NARROWEST * t)
-    of_directions[:, 3] = positive(of_directions[:, 3])
-    return of_directions, of_suns, model(fitted.x)
+    return _Fit(fitted.x, *tables(fitted.x), model(fitted.x))

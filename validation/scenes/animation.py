@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.area_lights.shape import turned_area_light
 from airlight.realtime.scene.animate import (
     Objects,

@@ -13,8 +13,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as MeshError
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import aligned_array
 from airlight.realtime.scene.closed_mesh import (
     FLAT,
@@ -40,10 +39,7 @@ def check_bodies(scene: Any) -> None:
     or lie within one another.
     """
     shapes = [shape for shape in scene.shapes() if _bounds_medium(shape)]
-    try:
-        read = [read_bounds(shape) for shape in shapes]
-    except MeshError as error:
-        raise InputError(str(error)) from None
+    read = [read_bounds(shape) for shape in shapes]
     if any(bounds is None for bounds, _ in read):
         meshes = {shape_number(shape): mesh for shape, (_, mesh) in zip(shapes, read) if mesh is not None}
         _check_crossings(meshes, scene_of([shape for shape, (_, mesh) in zip(shapes, read) if mesh is not None]))

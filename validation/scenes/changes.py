@@ -27,10 +27,11 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError, named_values, nearest
+from airlight.errors import InputError, nearest
 from airlight.reference.scene.transforms import matrix_of
 from airlight.reference.storage.scene_digest import description_digest, give_description
 from airlight.validation.arrays import Array
+from airlight.validation.readers import named_values
 from airlight.validation.scenes.height_fog import NUMBERS
 from airlight.validation.scenes.numbers import LARGEST_LENGTH, LARGEST_LIGHT
 

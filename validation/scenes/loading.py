@@ -14,7 +14,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.reference.storage.code import source_digest
 from airlight.reference.storage.scene_digest import give_description, is_whole, scene_digest
 from airlight.validation.scenes.bodies import check_bodies

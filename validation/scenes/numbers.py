@@ -12,8 +12,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as MethodError
+from airlight.errors import InputError
 from airlight.realtime.scene.rounding import check_rounding
 from airlight.validation.arrays import Array
 
@@ -44,10 +43,7 @@ def check_numbers(scene: Any) -> None:
                 _check(name, key, values)
         if "faces" in parameters:
             _check_faces(name, parameters)
-    try:
-        check_rounding(scene)
-    except MethodError as error:
-        raise InputError(str(error)) from None
+    check_rounding(scene)
 
 
 def _plugins(scene: Any) -> Iterator[tuple[str, Any]]:

@@ -7,8 +7,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import phase_from_words
+from airlight.errors import InputError
 from airlight.realtime.numerics.array_types import aligned_array
 from airlight.validation.scenes.meshes import Mesh
 

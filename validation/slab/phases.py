@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from airlight.analytic.droplets import Modified
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.errors import InputError
 from airlight.realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SlabPhase
 from airlight.realtime.droplets import CUT, droplet_series
 from airlight.realtime.scene.phase import HgDraine

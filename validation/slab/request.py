@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.slab.phases import PhasePair, phase_pair
 
 #: The sets of orders of Bouthors 2008, section 5.1; order 1 stands apart.

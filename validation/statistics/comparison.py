@@ -64,7 +64,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.columns import record_of
 from airlight.validation.metrics.errors import compared

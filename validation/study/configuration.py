@@ -13,8 +13,7 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-from airlight.analytic.errors import InputError, named_values, nearest
-from airlight.realtime.errors import InputError as MethodError
+from airlight.errors import InputError, nearest
 from airlight.realtime.frame.renderer import FrameRenderer, frame_renderer
 from airlight.realtime.kernels.registry import KERNELS, Kernel
 from airlight.realtime.methods.interface.method import method_parameters
@@ -25,6 +24,7 @@ from airlight.realtime.parameters import values
 from airlight.realtime.scene.read_scene import Scene
 from airlight.reference.storage.code import code_digest
 from airlight.reference.storage.store import Content
+from airlight.validation.readers import named_values
 from airlight.validation.study.cost import TIMED, Work, frame_work
 
 
@@ -79,14 +79,7 @@ def configuration(
     outside its range, values that contradict one another, and a method of one's own that cannot be loaded.
     """
     method = method if isinstance(method, str) else _function_name(method)
-    try:
-        record = find_method(method)
-    except MethodError as error:
-        raise InputError(str(error)) from error
-    try:
-        chosen, light_samples = method_parameters(record, parameters or {})
-    except MethodError as error:
-        raise InputError(str(error)) from error
+    chosen, light_samples = method_parameters(find_method(method), parameters or {})
     uses_kernel = chosen.uses_kernel
     if not uses_kernel and kernel is not None:
         raise InputError(f"method {method}: got the kernel {kernel!r}, but this method calls no kernel: leave it out")
@@ -119,7 +112,7 @@ def parse_settings(settings: Sequence[str]) -> dict[str, str]:
 def prepared(scene: Scene, chosen: Configuration, *, extra_layers: bool = False) -> FrameRenderer:
     """Return the frame renderer of a configuration for a scene; `extra_layers` as of `frame_renderer`.
 
-    Raises `airlight.realtime.errors.InputError` if the method refuses.
+    Raises InputError if the method refuses.
     """
     kernel = find_kernel(chosen.kernel) if chosen.kernel else None
     parameters: dict[str, Any] = dict(chosen.parameters)
@@ -192,10 +185,7 @@ def sized(name: str, size: int | None) -> str:
 
 
 def _imported(name: str) -> Kernel:
-    try:
-        function = user_object(name, "kernel")
-    except MethodError as error:
-        raise InputError(str(error)) from error
+    function = user_object(name, "kernel")
     if not callable(function):
         raise InputError(f"kernel {name}: it is a {type(function).__name__}; expected a function")
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.memory import usable_memory
 from airlight.reference.quadrature.image import light_samples_of_ray, rays_of_pixel
 

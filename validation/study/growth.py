@@ -45,7 +45,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import linregress
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.animate import turned_light
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.mesh_adjacency import mesh_triangles, scene_of

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.files import atomic_path, ensure_folder
 from airlight.validation.study.row import COLUMNS, arrow_schema, property_names
 

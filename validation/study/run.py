@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.clock import stopwatch
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import (
     Frame,
     FrameRenderer,
@@ -49,7 +49,7 @@ from airlight.validation.study.reference import Reference, load_cell
 from airlight.validation.study.row import Cost, Growth, Row, RunsError, StatedError
 from airlight.validation.study.stated_errors import stated_bound, worth_of_ends
 from airlight.validation.study.study import Cell, map_side, seed_of
-from airlight.validation.study.turns import REFUSALS, Apart, CellTimes, brief_times
+from airlight.validation.study.turns import Apart, CellTimes, brief_times
 
 Array = NDArray[np.float64]
 #: Makes a picture of reference and image, both (height, width, 3) [W/(m^2 sr)]; None where there is none.
@@ -83,7 +83,7 @@ def run(
         else:
             row, frame = render(scene, cell)
             runs = [] if frame is None or reference is None else _other_runs(scene, cell)
-    except REFUSALS as error:
+    except InputError as error:
         row, frame = cell_row(cell, status="refused", reason=str(error)), None
     if reference is None:
         return row, frame

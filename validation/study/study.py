@@ -34,7 +34,7 @@ from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from airlight.analytic.errors import InputError, nearest
+from airlight.errors import InputError, nearest
 from airlight.realtime.methods.registry import FOG_METHODS, METHODS
 from airlight.realtime.parameters import defaults
 from airlight.validation.readers import (

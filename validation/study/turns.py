@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from airlight.analytic.clock import Spent
-from airlight.analytic.errors import InputError as ReferenceInputError
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import FrameRenderer, parts, render_frame
 from airlight.realtime.methods.shader.source import is_shader
 from airlight.realtime.scene.read_scene import Scene, read_scene
@@ -49,7 +48,6 @@ Apart = Callable[..., Any]
 #: What `turns_of` yields: `Ready`, then lists of `FrameSpent`.
 Turns = Generator[Any, None, None]
 
-REFUSALS = (InputError, ReferenceInputError)  #: what methods and readers of scenes raise for what they cannot do
 
 #: A frame that takes longer is timed stage by stage, in few frames [s]. Its spread matters little, and the usual thirty
 #: or more frames would take minutes.
@@ -114,7 +112,7 @@ def time_cells(
                 else:
                     turns = turns_of(prepared(scene_of(cell), cell.chosen), cell.measure)
                 ready = next(stack.enter_context(closing(turns)))
-            except REFUSALS as error:
+            except InputError as error:
                 times[place] = CellTimes(lost=str(error))
                 continue
             times[place] = CellTimes(memory=ready.memory, device=ready.device)
@@ -215,7 +213,7 @@ def _piece(
         try:
             spent: list[FrameSpent] = next(turns, [])
             return spent
-        except REFUSALS as error:
+        except InputError as error:
             lose(error)
             return []
 

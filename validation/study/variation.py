@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import FrameRenderer, render_frame
 from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.validation.arrays import Array, Counted

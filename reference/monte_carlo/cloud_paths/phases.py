@@ -12,8 +12,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 
 Array = NDArray[np.float64]
 

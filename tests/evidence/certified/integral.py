@@ -23,8 +23,8 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 
 _FEWEST_DIGITS = 15
 

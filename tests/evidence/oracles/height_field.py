@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.light_volumes.texel_walls import PLACES
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap
 

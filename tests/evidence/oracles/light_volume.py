@@ -41,7 +41,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.light_volumes.jump_search import with_walls
 from airlight.realtime.scene.read_scene import Scene
 from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_field

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
 from airlight.realtime.methods.history import with_history

@@ -41,7 +41,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.registry import METHODS, PUBLISHED_METHODS
 from airlight.realtime.parameters import defaults
 from airlight.realtime.scene.read_scene import read_scene

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.frame.samples import render_samples
 from airlight.realtime.methods.registry import FOG_METHODS

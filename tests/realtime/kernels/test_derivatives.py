@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airlight.analytic.phase import PhaseFunction
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.numerics.array_types import aligned_array, array_types
 from airlight.realtime.rays import RayGeometry

@@ -8,8 +8,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from airlight.errors import InputError
 from airlight.realtime.clouds.canonical.coordinates import OPACITY
-from airlight.realtime.errors import InputError
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
 from airlight.realtime.kernels.registry import KERNELS

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import frame_renderer, render_frame
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import METHODS

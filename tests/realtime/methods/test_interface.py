@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.frame.renderer import frame_renderer, image_frame, render_frame
 from airlight.realtime.methods.interface.method import Layers

@@ -3,7 +3,7 @@
 
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from tests.helpers.frames import renderer
 from tests.helpers.lamps import lamp_scene
 

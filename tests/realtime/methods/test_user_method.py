@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import frame_renderer, render_frame
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import find_method
@@ -21,7 +21,7 @@ SOURCE = """
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from dataclasses import dataclass
 from airlight.realtime.methods.interface.method import Layers, Method
 

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import frame_renderer, render_frame
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.mesh_adjacency import make_occluders, read_occluders

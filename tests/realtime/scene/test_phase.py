@@ -7,8 +7,8 @@ import pytest
 
 from airlight.analytic.droplets import Droplets, Modified, optics
 from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.errors import InputError
 from airlight.realtime.droplets import droplet_series, fraction_cut
-from airlight.realtime.errors import InputError
 from airlight.realtime.scene.phase import named_phase
 
 

@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera

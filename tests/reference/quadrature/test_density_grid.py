@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, simpson
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.single_scatter.integrator import single_scatter_batch
 from airlight.reference.monte_carlo.volpath import volpath_batch
 from airlight.reference.quadrature.fields import field_of

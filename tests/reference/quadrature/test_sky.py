@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import cumulative_simpson, quad, simpson
 from scipy.special import expn
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.volpath import volpath_batch
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.replicates import PointPlan

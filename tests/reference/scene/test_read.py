@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.camera import ray_directions
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.area_light import triangle_normals

@@ -4,7 +4,7 @@ import resource
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import Image, layer, read_exr, write_exr
 
 SIZE = (5, 7)

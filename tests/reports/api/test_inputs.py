@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import airlight
-from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.errors import InputError
 from airlight.realtime.errors import NoDriverError
 from airlight.reports.api.inputs import (
     changes_of,
@@ -63,7 +63,7 @@ def test_files_have_one_of_the_endings_and_none_is_no_file(tmp_path):
 @pytest.mark.parametrize(
     ("raised", "seen", "words"),
     [
-        (RealtimeInputError("no light"), airlight.InputError, "^no light$"),
+        (InputError("no light"), airlight.InputError, "^no light$"),
         (NoDriverError("EGL 1.4"), MissingError, r"^shaders need OpenGL 4\.3, and it does not start \(EGL 1\.4\)"),
         (NoDriverError("no moderngl"), MissingError, "^shaders need the package moderngl"),
         (ZeroDivisionError("a fault"), ZeroDivisionError, "^a fault$"),

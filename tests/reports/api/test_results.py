@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image as Picture
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.build import build
 from airlight.reference.storage.exr import Image, read_exr
 from airlight.reports.api.compare import compare

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from airlight import __version__
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.cluster.connect import connected, parse_place
 from airlight.validation.study.keys import made_here
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 import airlight
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as RealtimeInputError
+from airlight.errors import InputError
 from airlight.reports.commands import main as cli
 from airlight.reports.machine.environment import MissingError
 from airlight.reports.machine.process_start import EXTRAS
@@ -41,7 +40,6 @@ def command_that_raises(monkeypatch):
     ("error", "status", "words"),
     [
         (InputError("albedo: got 2,\n  expected at most 1"), 2, "airlight: error: albedo: got 2, expected at most 1"),
-        (RealtimeInputError("no light"), 2, "airlight: error: no light"),
         (MissingError("no libLLVM"), 3, "airlight: error: no libLLVM"),
         (FileNotFoundError(2, "No such file or directory", "a.exr"), 2, "error: a.exr: No such file or directory"),
         (PermissionError(13, "Permission denied", "out"), 2, "error: out: Permission denied"),

@@ -8,7 +8,7 @@ import pytest
 
 import airlight
 import airlight.validation.study.turns
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import read_exr
 from airlight.reports.commands import main as cli
 from airlight.validation.study.cost import TIMED

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.data.records import load_report, read_report
 from airlight.validation.study.study import standard_study
 from tests.helpers.page import report_data, write_report_files

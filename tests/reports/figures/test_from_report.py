@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image as Picture
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.reports.data.records import load_report
 from airlight.reports.figures import report as figures

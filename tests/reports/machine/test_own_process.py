@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.machine.own_process import EndedError, in_own_process
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.reports.page.images import (
     DIFFERENCE_BITS,

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.reports.data.records import named_files, read_report, report_text
 from airlight.reports.machine.own_process import EndedError

@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.sweep.claims import claim, correlations, strongest, sure
 from airlight.reports.sweep.faults import checks, faults, reasons
 from airlight.reports.sweep.samples import FILE, Fastest, fastest_within, read_sweep, samples

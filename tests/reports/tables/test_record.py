@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reports.tables.record import Said, picture, print_json
 from airlight.reports.tables.table import numbers, table
 

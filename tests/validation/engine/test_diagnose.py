@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import NOTE, Image

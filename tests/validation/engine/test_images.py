@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.validation.engine.hints import find_hints
 from airlight.validation.engine.images import (

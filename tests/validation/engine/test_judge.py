@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.validation.comparison.images import compare_images
 from airlight.validation.engine.error_place import error_place

@@ -12,7 +12,7 @@ import pytest
 
 import airlight.validation.estimates.images
 import airlight.validation.estimates.monte_carlo
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.monte_carlo.batches import Batches, single_batch
 from airlight.reference.quadrature.surface import surface_hits
 from airlight.reference.scene.read import read_reference

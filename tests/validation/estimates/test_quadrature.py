@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import airlight.validation.estimates.quadrature as module
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.quadrature import area_lights
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.ray_values import ReferenceImage

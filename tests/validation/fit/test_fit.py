@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.exr import Image
 from airlight.validation.engine.prediction import Guess, Predictor, SceneLight

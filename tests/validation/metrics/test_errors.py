@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.columns import plain
 from airlight.validation.metrics.colour import ciede2000, colour_difference, delta_e_itp
 from airlight.validation.metrics.errors import error_metrics

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.exr import Image, write_exr
 from airlight.validation.columns import plain
 from airlight.validation.estimates.quadrature import reference_image

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.papers import billeter_tables, biri_tables
 from airlight.validation.papers.billeter_tables import attempted, frame_within, sampled, table_scene

@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.scenes.bodies import check_bodies
 from airlight.validation.scenes.meshes import box, icosphere, joined, placed, torus
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, loaded, ring

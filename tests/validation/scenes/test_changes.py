@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.incremental import next_frame
 from airlight.realtime.methods.registry import FOG_METHODS
 from airlight.realtime.scene.read_scene import read_again, read_scene

@@ -7,8 +7,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.height_fog import HeightFog, Layer
+from airlight.errors import InputError
 from airlight.reference.quadrature.height_fog import fog_of
 from airlight.reference.scene.read import read_reference
 from airlight.validation.scenes.engine_fog import ENGINES, layers_of, parameters_of

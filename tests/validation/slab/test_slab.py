@@ -5,8 +5,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
 from airlight.analytic.phase import PhaseFunction
+from airlight.errors import InputError
 from airlight.validation.slab.light import slab_numbers
 from airlight.validation.slab.phases import phase_pair, read_phase_file
 from airlight.validation.slab.request import slab_request

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.statistics.comparison import NoisyImage, compare_statistics
 from tests.helpers.calibration import BATCHES, SIZE, around_one, monte_carlo
 

@@ -8,8 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
-from airlight.realtime.errors import InputError as MethodError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.kernels.stepping import quadrature
@@ -114,7 +113,7 @@ def test_a_users_kernel_is_found_in_the_current_folder_and_says_where_it_fails(t
         monkeypatch.delitem(sys.modules, module, raising=False)
     kernel = find_kernel(name.format(folder=folder))
     assert kernel(2.0) == 1.0
-    with pytest.raises(MethodError, match=r"^kernel .*fog_kernel\.py, line 5: ZeroDivisionError"):
+    with pytest.raises(InputError, match=r"^kernel .*fog_kernel\.py, line 5: ZeroDivisionError"):
         kernel(0.0)
 
 

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.clock import peak_memory
 from airlight.validation.scenes.loading import load_scene

@@ -36,7 +36,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.estimates.quadrature import reference_image

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.study.rows import PICTURES, ROWS, RowStore
 
 pytest.importorskip("pyarrow", reason="the extra `sweep` is not installed")

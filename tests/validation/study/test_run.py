@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import FrameRenderer
 from airlight.realtime.memory import Memory
 from airlight.realtime.methods.registry import FOG_METHODS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airlight.analytic.clock import Spent
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import frame_renderer
 from airlight.realtime.methods.registry import METHODS
 from airlight.realtime.scene.read_scene import read_scene

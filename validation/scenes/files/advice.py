@@ -8,7 +8,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.scenes.files.nodes import kind, of_kind, properties, reached, used
 
 _PLACE = re.compile(r"\[[\w.]+(:\d+)?\]\s*")  # of Mitsuba's source, before its words

@@ -10,7 +10,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.camera import camera_matrix
 
 _USUAL_NEAR = 1e-2  # Mitsuba's own near plane [m], of which files say nothing

@@ -9,7 +9,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.storage.files import temporary_folder
 from airlight.reference.storage.scene_digest import description_digest, give_description
 from airlight.validation.scenes.changes import give_lobes

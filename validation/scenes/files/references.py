@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.mesh_adjacency import scene_of
 from airlight.reference.scene.camera import camera_matrix
 from airlight.validation.scenes.files.nodes import child, kind, of_kind, properties, references

@@ -12,7 +12,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.transforms import matrix_of
 from airlight.validation.arrays import Array
 from airlight.validation.scenes.files.nodes import kind, of_kind, properties, references

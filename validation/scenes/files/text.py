@@ -8,7 +8,7 @@ process at elements that are nested too deeply, since its reader calls itself fo
 from pathlib import Path
 from xml.parsers import expat
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 
 _DEEPEST = 200  # elements in one another; a scene has about ten
 #: How files begin that people give in place of a scene, what they are, and what to do.

@@ -21,7 +21,7 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.validation.arrays import Array
 from airlight.validation.readers import Reader, read_named, read_number, read_table, read_toml
 

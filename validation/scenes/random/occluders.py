@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.mesh_adjacency import mesh_triangles
 from airlight.validation.arrays import Array
 from airlight.validation.scenes.meshes import (

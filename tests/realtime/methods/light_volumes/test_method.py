@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import image_frame, run_stages
 from airlight.realtime.methods.light_volumes.jump_search import _JUMP, with_walls
 from airlight.realtime.methods.light_volumes.texel_walls import PLACES, walled_heights

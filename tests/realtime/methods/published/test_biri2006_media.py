@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.reference.scene.read import read_reference
 from tests.helpers import frames
 from tests.helpers.frames import relative_rmse

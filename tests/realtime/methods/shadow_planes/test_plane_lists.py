@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import airlight.realtime.methods.shadow_planes.plane_table as module
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.shadow_planes.plane_table import NUMBER, planes_of_rays
 from airlight.realtime.methods.shadow_planes.sweep import sum_lit_intervals
 from tests.helpers.shadow_planes import CAMERA, LIGHT, bundles, crossings, lit_lengths, occluders_of, planes_of, rays_of

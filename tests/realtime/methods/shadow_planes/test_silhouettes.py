@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.methods.shadow_planes.plane_table import index_planes, layers_between, light_basis
 from airlight.realtime.methods.shadow_planes.silhouettes import components_in_view, silhouette
 from airlight.realtime.numerics.array_types import array_types

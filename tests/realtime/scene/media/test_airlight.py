@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.read import read_reference

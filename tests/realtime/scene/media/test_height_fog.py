@@ -13,7 +13,7 @@ from airlight.analytic.height_fog import HeightRays as HostRays
 from airlight.analytic.height_fog import Layer as HostLayer
 from airlight.analytic.height_fog import height_fog_segments
 from airlight.analytic.phase import PhaseFunction
-from airlight.realtime.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.frame.renderer import frame_renderer, render_frame
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.methods.registry import METHODS

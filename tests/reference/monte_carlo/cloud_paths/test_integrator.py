@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm, t
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.clouds.slab_orders.phases import HenyeyGreensteinPhase
 from airlight.reference.monte_carlo.batches import merged
 from airlight.reference.monte_carlo.cloud_paths.integrator import cloud_paths_batch

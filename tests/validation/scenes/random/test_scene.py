@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.errors import InputError
+from airlight.errors import InputError
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.read import read_reference
 from airlight.reference.storage.scene_digest import scene_digest
