@@ -21,6 +21,7 @@ def files_of_frame(scene: str, method: str) -> list[str]:
     """Return the files, relative to the repository."""
     activate()
     loaded, passed = load_scene(scene, (64, 48)).scene, dict[str, None]()
+    find_method(method)  # its files are loaded here: what runs while they are is no part of a frame
     sys.setprofile(lambda frame, event, _: passed.setdefault(frame.f_code.co_filename) if event == "call" else None)
     try:
         render_frame(frame_renderer(read_scene(loaded), find_method(method), kernel=KERNELS["exact"]))

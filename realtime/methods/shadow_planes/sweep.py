@@ -11,7 +11,9 @@ the point is lit where it is zero. Planes come in the order of the middle of a w
 cross within the wedge can come in the wrong order for a ray, so a crossing waits in a queue of two until two more have
 been read. Where that is not enough the ray notices, since its quotients must fall, and starts again with a queue of
 eight; after that it collects the eight nearest crossings from the whole list, goes over them, collects the next eight,
-and so on. That is right for any order.
+and so on. That is right for any order. Both queues are worth their code: in processor time at 800 x 600, `tangle`
+takes 2.4 times as long without the queue of eight, and `hall` 17 % longer, `clutter` 12 % without that of two (29
+November 2026).
 
 A walk is one loop that reads a plane or goes over a crossing. An interval that has ended waits until every fourth plane
 (`realtime.intervals` says why): neighbours whose intervals end at two edges of one silhouette are then served at once.

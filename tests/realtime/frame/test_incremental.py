@@ -38,7 +38,7 @@ STEPS = ("light", "medium", "colour", "camera", "light", "objects", "colour", "l
 
 
 def made(scene: Scene, method: str, **parameters) -> FrameRenderer:
-    kernel = KERNELS["taylor"]
+    kernel = KERNELS["exact" if scene.features.bounded else "taylor"]
     return frame_renderer(scene, METHODS[method], kernel=kernel, **parameters)
 
 

@@ -126,7 +126,7 @@ def test_without_occluders_in_view_a_medium_is_its_end_less_its_entry(variant):
 
 
 def test_ambient_light_is_added_by_its_formula(variant):
-    scene = tiny_scene()
+    scene = tiny_scene(ball=occluder())
     without, with_it = (render(scene, ambient=each) for each in (0.0, 0.23))
     depth = 0.31 * np.minimum(without.distance, 1e30)
     expected = 0.23 * np.array([0.9, 0.8, 0.7]) * (1 - np.exp(-depth))[..., None]
