@@ -8,6 +8,7 @@ adds that to the surfaces. Mitsuba only reads the scene and casts rays. Nothing 
 Rooms:
 
 - `errors.py`: the exceptions for mistakes of the user and for a missing driver;
+- `child_process.py`: a process for work that may hang, started, asked and ended;
 - `memory.py`: refuses work that needs more memory than the machine, its container or the GPU has;
 - `transforms.py`: transforms of Mitsuba's plugins, and which of them lights and spheres cannot have;
 - `parameters.py`: typed parameters of methods, with defaults, ranges and help;

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from airlight.analytic.clock import stopwatch
+from airlight.realtime.child_process import EndedError
 from airlight.reference.storage.build import build
 from airlight.reports.machine.environment import (
     MissingError,
@@ -29,7 +30,7 @@ from airlight.reports.machine.environment import (
 from airlight.reports.machine.gpu import cuda_status, optix_status
 from airlight.reports.machine.llvm import find_llvm
 from airlight.reports.machine.opengl import opengl_status
-from airlight.reports.machine.own_process import EndedError, in_own_process
+from airlight.reports.machine.own_process import in_own_process
 from airlight.reports.tables.record import Result
 from airlight.reports.tables.table import Table, table, words
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from airlight.analytic.clock import stopwatch
 from airlight.errors import InputError
+from airlight.realtime.child_process import EndedError
 from airlight.realtime.methods.shader.source import is_shader
 from airlight.reference.storage.files import NO_SPACE, alone, ensure_folder
 from airlight.reference.storage.store import Kept, date, fresh_results
@@ -33,7 +34,7 @@ from airlight.reports.data.records import (
 )
 from airlight.reports.machine.environment import describe_environment, machine, threads
 from airlight.reports.machine.opengl import require_opengl
-from airlight.reports.machine.own_process import EndedError, in_own_process
+from airlight.reports.machine.own_process import in_own_process
 from airlight.reports.machine.progress import Progress, sharing
 from airlight.reports.page.render import render_page
 from airlight.reports.report.claims import claims, growth_claims, own_fault, unstudied

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process in which OpenGL draws: run by its path, it imports nothing of ours.
+"""The process in which OpenGL draws: it imports nothing of ours that loads Mitsuba or Dr.Jit.
 
-It is asked on the standard input and answers on the standard output. A message is its length in eight bytes and a NumPy
-archive, whose entry `message` is JSON:
+A message is its kind, names with values, and names with arrays; an answer is names with values, and an image or None:
 
     open    stages, each with name, text, kind ('picture', '2d', '3d'), size, format, and the words that it uses
     frame   arrays, and how many frames to draw, after forgetting the last ones if `reset`; the answer has the names of
@@ -13,17 +12,14 @@ A time is the wall clock's from the first call to the end of `finish()` where th
 llvmpipe are wrong. On a GPU it is that of a query.
 """
 
-import io
-import json
-import os
 import signal
-import struct
 import sys
 import time
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
+
+from airlight.realtime.child_process import connection_to_caller, method_limit
 
 _SOFTWARE = ("llvmpipe", "softpipe", "SwiftShader")
 _TARGETS = {"rgba16f": (4, "f2"), "rgba32f": (4, "f4"), "r32f": (1, "f4")}
@@ -64,9 +60,9 @@ class Host:
                     program = self.context.program(vertex_shader=_VERTICES, fragment_shader=stage["text"])
                     self.programs.append((program, self.context.vertex_array(program, [])))
             except self.error as error:
-                return {"log": str(error)}, {}
+                return {"log": str(error)}, None
             self.targets.append([self._image(stage) for _ in range(1 if stage["kind"] == "picture" else 2)])
-        return self.device, {}
+        return self.device, None
 
     def _image(self, stage):
         """Return a black image, and the framebuffer that draws into it."""
@@ -161,48 +157,38 @@ class Host:
         image, _ = self.targets[-1][0]
         width, height = self.stages[-1]["size"]
         pixels = np.frombuffer(image.read(), dtype=np.float32).reshape(height, width, 4)
-        return {"ms": times, "unset": self._unset()}, {"image": pixels[..., :3]}
+        return {"ms": times, "unset": self._unset()}, pixels[..., :3]
 
     def again(self, message, arrays):
         """Draw the same for some seconds, at least three times."""
         end, times = time.perf_counter() + message["seconds"], list[float]()
         while len(times) < 3 or time.perf_counter() < end:
             times.append(self.draw(self.uniforms))
-        return {"ms": times}, {}
+        return {"ms": times}, None
 
 
 def main():
     """Answer until nobody asks."""
-    output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a driver prints
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    limit = float(sys.argv[1])
-    host = None
+    caller, host = connection_to_caller(), None
+    limit = int(method_limit()) + 2
     try:
         host = Host()
     except Exception as error:  # whatever a driver, or its absence, raises
         missing = " ".join(str(error).split()) or type(error).__name__
     while True:
-        head = sys.stdin.buffer.read(8)
-        if len(head) < 8:
+        try:
+            kind, message, arrays = caller.recv()
+        except EOFError:
             return
-        with np.load(io.BytesIO(sys.stdin.buffer.read(*struct.unpack("<Q", head)))) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        message = json.loads(str(arrays.pop("message")))
-        if hasattr(signal, "alarm"):
-            signal.alarm(int(limit) + 2)  # ends a driver that never returns, though its caller may be gone
         if host is None:
-            answer, made = {"missing": missing}, {}
-        else:
-            work = {"open": host.open, "frame": host.draw_frames, "again": host.again}[message["kind"]]
-            answer, made = work(message, arrays)
-        if hasattr(signal, "alarm"):
-            signal.alarm(0)
-        packed = io.BytesIO()
-        np.savez(packed, message=np.array(json.dumps(answer)), **made)
-        with suppress(BrokenPipeError):
-            output.write(struct.pack("<Q", packed.tell()) + packed.getvalue())
-            output.flush()
+            caller.send(({"missing": missing}, None))
+            continue
+        # A driver that never returns may hold Python's lock: no thread could end it with its caller.
+        signal.alarm(limit)
+        work = {"open": host.open, "frame": host.draw_frames, "again": host.again}[kind]
+        answer = work(message, arrays)
+        signal.alarm(0)
+        caller.send(answer)
 
 
 if __name__ == "__main__":

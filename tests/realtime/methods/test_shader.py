@@ -260,19 +260,19 @@ def test_a_frame_that_takes_too_long_ends_with_its_process(drawn, monkeypatch):
     text = """#pragma airlight frames 1000
 vec3 airlight(Ray ray) { float x = ray.distance; for (int i = 0; i < 60000; ++i) x = sin(x + 1.0); return vec3(x); }
 """
-    with pytest.raises(InputError, match=r"no frame within 1\.5 s; its process was ended; AIRLIGHT_METHOD_LIMIT=3 all"):
+    with pytest.raises(InputError, match=r"no answer within 1\.5 s; its process was ended; AIRLIGHT_METHOD_LIMIT=3 "):
         drawn(text)
 
 
 @pytest.mark.parametrize("limit", ["0", "nan", "inf", "1e12", "soon"])
 def test_a_limit_of_time_is_one_that_every_process_can_keep(monkeypatch, limit):
     monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", limit)
-    with pytest.raises(InputError, match=r"AIRLIGHT_METHOD_LIMIT: got '.*', expected a time above 0 up to 2e\+09"):
+    with pytest.raises(InputError, match=r"AIRLIGHT_METHOD_LIMIT: got '.*', expected a time above 0 up to 2e\+06"):
         ShaderHost("fog.glsl")
 
 
 def test_the_longest_limit_of_time_draws(drawn, monkeypatch):
-    monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", "2e9")
+    monkeypatch.setenv("AIRLIGHT_METHOD_LIMIT", "2e6")
     assert (drawn(_BLACK).airlight == 0).all()
 
 
@@ -280,8 +280,8 @@ def test_a_process_that_ends_is_a_fault_and_no_driver_is_missing(monkeypatch, tm
     need_opengl()
     host = ShaderHost("fog.glsl")
     host.ask("open", stages=[])
-    host._process.kill()
-    with pytest.raises(InputError, match=r"method fog\.glsl: ended its process, exit status -9"):
+    host._process._process.kill()
+    with pytest.raises(InputError, match=r"method fog\.glsl: ended its process, killed by SIGKILL"):
         host.ask("again", seconds=0.0)
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", str(tmp_path))
     with pytest.raises(NoDriverError):

@@ -75,7 +75,7 @@ def handed_on(monkeypatch):
 FAULTS = {
     "broken": "fog_of_mine.py, line 11: KeyError: 'nothing'",
     "flat": "returned an array of shape (3, 7) for",
-    "hangs": "did not end within 45 s and was stopped; AIRLIGHT_METHOD_LIMIT=90 allows more",
+    "hangs": "no answer within 45 s; its process was ended; AIRLIGHT_METHOD_LIMIT=90 allows more",
     "crashes": "ended its process, killed by SIGABRT",
     "exits": "SystemExit: 0",
     "darkens": "RuntimeError: too large",

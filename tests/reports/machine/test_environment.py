@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airlight.realtime.child_process import EndedError
 from airlight.reference.storage.build import build
 from airlight.reference.storage.cache import store_arrays
 from airlight.reports.commands.main import run
 from airlight.reports.machine import doctor, environment, gpu, llvm
 from airlight.reports.machine.environment import MissingError, missing_packages, prepare
 from airlight.reports.machine.llvm import find_llvm
-from airlight.reports.machine.own_process import EndedError
 
 ROOT = Path(__file__).resolve().parents[3]
 HEADER = Path(sys.executable).read_bytes()[:64]  # of a binary that suits this machine

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from airlight.errors import InputError
+from airlight.realtime.child_process import EndedError
 from airlight.reference.storage.exr import Image, read_exr, write_exr
 from airlight.reports.data.records import named_files, read_report, report_text
-from airlight.reports.machine.own_process import EndedError
 from airlight.reports.report.measure import staged, write_report
 from airlight.reports.report.others import other_parts
 from airlight.reports.report.scene import file_stems, folder_of, reference_record
