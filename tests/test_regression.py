@@ -33,7 +33,7 @@ def test_a_fault_of_a_thousandth_is_found(monkeypatch, variant):
         "find_kernel",
         lambda name: Kernel(name, lambda *arguments: 1.001 * find(name)(*arguments), exact=True),
     )
-    monkeypatch.setattr(baselines, "baseline_configurations", lambda name, features: (plain,))
+    monkeypatch.setattr(baselines, "baseline_configurations", lambda name, scene: (plain,))
     moves = compare_baseline(read_baseline("open-fog"), measure_baseline("open-fog"))
     moved = {move.what: move for move in moves if move.label == plain.label}
     assert moved["airlight relative_bias"].new == pytest.approx(1e-3, rel=1e-3)

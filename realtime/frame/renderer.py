@@ -171,7 +171,7 @@ def frame_renderer(
         structures={},
         kernel=kernel.prepared(type(scene.camera.origin.x)) if chosen.uses_kernel and kernel else None,
         extra_layers=extra_layers and not scene.area_lights,
-        sphere_scales=sphere_scales(scene, chosen) if "sphere" in scene.features.area_lights else None,
+        sphere_scales=sphere_scales(scene, chosen),
         history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x)) if chosen.history else None,
         mask=blue_mask() if chosen.noisy else None,
     )
@@ -189,10 +189,10 @@ def frame_renderer(
 
 def _check_clouds(scene: Scene, method: Method) -> None:
     """Refuse clouds and skies where a method does not know them, and where it does what clouds cannot have."""
-    features, name = scene.features, method.name
+    medium, name = scene.medium, method.name
     near = [light.kind for light in scene.lights if light.w] + [f"area ({light.kind})" for light in scene.area_lights]
     if not method.renders_clouds:
-        if features.uneven:
+        if medium.clouds is not None and medium.clouds.density is not None:
             way_out = (
                 f"replace it, since no method has one with a light of kind {near[0]}"
                 if near
@@ -202,18 +202,19 @@ def _check_clouds(scene: Scene, method: Method) -> None:
                 f"method {name}: the scene has a heterogeneous medium, and this method knows media of type "
                 f"'homogeneous' only; {way_out}"
             )
-        if features.concave:
+        if medium.clouds is not None and not medium.bounded_media:
+            shapes = [shape.id() for shape in scene.boundaries]
             raise InputError(
                 f"method {name}: the bounds of the media are not all convex, and these rays cross convex bounds only "
-                f"(shapes {', '.join(map(repr, features.concave[:3]))}); use cloud-collectors or cloud-octaves, or cut "
+                f"(shapes {', '.join(map(repr, shapes[:3]))}); use cloud-collectors or cloud-octaves, or cut "
                 "the shapes into convex parts"
             )
-        if features.sky:
+        if any(light.sky is not None for light in scene.lights):
             raise InputError(
                 f"method {name}: the scene has a sky, an emitter of type 'constant', which this method does not know; "
                 "use cloud-collectors or cloud-octaves, or remove it"
             )
-        if features.grid and method.uses_kernel:
+        if medium.sums_depth and method.uses_kernel:
             raise InputError(
                 f"method {name}: the medium is a density grid, and this method adds up integrals of lit segments, for "
                 "which no kernel knows a grid; use froxel-fog, soft-shafts, or ray-march with sum=steps"
@@ -248,7 +249,7 @@ def _few_together(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
     """Return a few lights without extent together, more of them and light samples one by one."""
     scene = renderer.scene
     groups = [scene.lights] if scene.lights else []
-    if len(scene.lights) > (1 if scene.features.bounded else _FEW):
+    if len(scene.lights) > (1 if scene.medium.bounded_media else _FEW):
         groups = [(light,) for light in scene.lights]
     return groups + [(sample,) for sample in renderer.samples]
 
@@ -265,7 +266,7 @@ def surface_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
 
 def _few_lights(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
     """Return the lights of a scene, few of one structure together: a call goes through the whole Mitsuba scene."""
-    most = 1 if renderer.scene.features.bounded else _FEW
+    most = 1 if renderer.scene.medium.bounded_media else _FEW
     alike: dict[Any, list[Light]] = {}
     for light in (light for lights in _few_together(renderer) for light in lights):
         alike.setdefault(_structure((light,)), []).append(light)

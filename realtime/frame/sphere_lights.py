@@ -48,10 +48,12 @@ class SampledSphere:
 
 
 def sphere_scales(scene: Scene, method: Method) -> Frozen | None:
-    """Return a function for the scale of a sphere light's samples; None where the method or the medium has no use.
+    """Return a function for the scale of a sphere light's samples; None where scene, method or medium have no use.
 
     Valid for methods that render samples one by one with a kernel in a homogeneous medium without bounds.
     """
+    if not any(light.kind == "sphere" for light in scene.area_lights):
+        return None
     if method.at_once or not method.uses_kernel or not isinstance(scene.medium, Homogeneous):
         return None
     features = scene.features

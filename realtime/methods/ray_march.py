@@ -93,7 +93,7 @@ class RayMarch(Method):
 
     def check(self, scene):
         """Refuse maps that have no room, and uniform steps on an unbounded ray through a vacuum."""
-        if self.spacing == "uniform" and scene.features.vacuum and not scene.medium.clear:
+        if self.spacing == "uniform" and scene.medium.vacuum and not scene.medium.clear:
             raise InputError(
                 "spacing=uniform: an unbounded ray through a vacuum has no step length; use spacing=equiangular"
             )

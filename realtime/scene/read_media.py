@@ -92,13 +92,12 @@ def opaque_scene(scene, opaque):
     return scene_of(opaque)
 
 
-def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[ClosedMesh, ...]]:
+def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     """Return the medium of a scene with the bounded media in it.
 
-    `sensor`: Mitsuba's sensor; `boundaries`: the shapes that bound media; `types`: array types to compute with. Returns
-    `medium`: in vacuum with `clouds`, whatever the bounds; with `bounded_media` only where all bounds are convex;
-    `meshes`: the bounds where not all of them are convex, or a medium is not homogeneous; then all are meshes. Raises
-    InputError for media that no method can render, with the name of what is in the way.
+    `sensor`: Mitsuba's sensor; `boundaries`: the shapes that bound media; `types`: array types to compute with. The
+    medium has `clouds` in vacuum, whatever the bounds, and `bounded_media` only where all bounds are convex and all
+    media homogeneous. Raises InputError for media that no method can render, with the name of what is in the way.
     """
     if not boundaries:
         if sensor.get_medium() is None:
@@ -107,10 +106,10 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
                 '<ref name="medium" id="..."/> inside the sensor'
             )
         if _is_height_fog(sensor.get_medium()):
-            return _height_fog(sensor.get_medium(), types), ()
+            return _height_fog(sensor.get_medium(), types)
         if not sensor.get_medium().is_homogeneous() and "sigma_t.data" in mi.traverse(sensor.get_medium()):
-            return _grid_medium(sensor.get_medium(), types), ()
-        return _homogeneous(sensor.get_medium(), types), ()
+            return _grid_medium(sensor.get_medium(), types)
+        return _homogeneous(sensor.get_medium(), types)
     for shape in boundaries:
         for own in (shape.interior_medium(), shape.exterior_medium()):
             if _is_height_fog(own):
@@ -149,7 +148,7 @@ def read_medium(sensor, boundaries, types: ArrayTypes) -> tuple[Medium, tuple[Cl
         clouds = replace(clouds, density=density_on_device(grids, types))
     ambient = _in_channels(ambient, channels)
     surrounding = ambient.sigma_t, ambient.albedo, ambient.phase
-    return BoundedMedia(*surrounding, bounded_media, clear=around is None, clouds=clouds), meshes
+    return BoundedMedia(*surrounding, bounded_media, clear=around is None, clouds=clouds)
 
 
 def _closed_meshes(

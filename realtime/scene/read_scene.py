@@ -20,7 +20,6 @@ from airlight.realtime.area_lights.shape import AreaLight, read_area_light
 from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import ArrayTypes, array_types, types_of
 from airlight.realtime.scene.camera import Camera, sensor_camera
-from airlight.realtime.scene.closed_mesh import ClosedMesh
 from airlight.realtime.scene.directional_extent import (
     directional_fields,
     distance_before,
@@ -41,25 +40,10 @@ _UPRIGHT = 1e-3  # cosine between a camera's left, or its up, and an axis that c
 
 @dataclass(frozen=True)
 class SceneFeatures:
-    """The features of a scene; every field chooses which code runs, and none is data."""
+    """The code that the shapes of a scene need; media, lights and methods answer for themselves."""
 
     shadows: bool  #: there is something that can cast a shadow
     surfaces: bool  #: there is something that the camera can see
-    extinctions: int  #: 1 for a grey medium, 3 for a coloured one
-    isotropic: bool  #: the phase function is a constant
-    bounded: bool  #: the medium ends somewhere
-    vacuum: bool  #: nothing is extinguished in at least one channel
-    point_lights: int
-    spot_lights: int
-    soft_spots: bool  #: a spot's intensity falls off inside its cone
-    directional_lights: int = 0
-    area_lights: tuple[str, ...] = ()  #: the shapes of area lights: 'rectangle', 'disk', 'sphere' or 'mesh'
-    clear: bool = False  #: bounded: nothing fills the space between the media
-    concave: tuple[str, ...] = ()  #: shapes that bound media and are not all convex: clouds
-    uneven: int = 0  #: clouds whose density differs from place to place
-    sky: str = ""  #: the axis from which a uniform sky shines, '' where there is none; it is seen behind the scene
-    height_fog: bool = False  #: the density of the medium depends on height
-    grid: bool = False  #: the density of the medium is a grid
     notes: tuple[str, ...] = ()  #: what the user should know of this scene
 
 
@@ -129,12 +113,12 @@ def _read_parts(scene, types: ArrayTypes) -> tuple[dict[str, Any], list[Any]]:
     """Return the fields of a `Scene` except for its shapes, and the opaque shapes."""
     camera, sensor = sensor_camera(scene, types)
     opaque, boundaries = sort_shapes(scene)
-    medium, meshes = read_medium(sensor, boundaries, types)
+    medium = read_medium(sensor, boundaries, types)
     if not scene.emitters():
         raise InputError(
             "the scene has no light; expected at least one emitter of type 'point', 'spot', 'directional' or 'area'"
         )
-    bodies = _Bodies(medium, meshes, boundaries, opaque)
+    bodies = _Bodies(medium, boundaries, opaque)
     behind = backgrounds(scene, clouds=medium.clouds is not None)
     lights = tuple(
         _read_directional(emitter, bodies, types)
@@ -164,7 +148,6 @@ class _Bodies:
     """The media and shapes that light meets."""
 
     medium: Medium
-    meshes: tuple[ClosedMesh, ...]  #: bounds of media that are not all convex
     boundaries: list[Any]  #: Mitsuba's shapes around bounded media
     opaque: list[Any]  #: Mitsuba's other shapes
 
@@ -294,7 +277,7 @@ def _read_angles(parameters) -> tuple[float, float]:
 def _scene_features(
     scene, bodies: _Bodies, lights: tuple[Light, ...], area_lights: tuple[AreaLight, ...]
 ) -> SceneFeatures:
-    medium, opaque = bodies.medium, bodies.opaque
+    opaque = bodies.opaque
     notes = scene_notes(scene, clouds=bodies.medium.clouds is not None)
     for shape in opaque:
         flags = shape.bsdf().flags()
@@ -302,37 +285,13 @@ def _scene_features(
             notes.append(
                 f"shape '{shape.id()}' is not purely diffuse: shaded by its diffuse reflectance, airlight unaffected"
             )
-    phases = [bounded_medium.medium.phase for bounded_medium in medium.bounded_media]
-    phases += list(medium.clouds.phases) if medium.clouds else [medium.phase] * (not medium.clear)
     # A light by itself casts no shadow, unless parts of it stand in the light of others.
     alone = not lights and len(area_lights) == 1 and area_lights[0].opaque and not area_lights[0].folded
     return SceneFeatures(
         shadows=len(opaque) > (1 if alone else 0),
         surfaces=bool(opaque),
-        extinctions=medium.channels,
-        isotropic=all(phase.constant for phase in phases),
-        bounded=bool(medium.bounded_media),
-        clear=medium.clear,
-        height_fog=isinstance(medium, HeightFog),
-        grid=isinstance(medium, GridMedium),
-        vacuum=medium.vacuum,
-        point_lights=sum(light.kind == "point" for light in lights),
-        spot_lights=sum(light.kind == "spot" for light in lights),
-        directional_lights=sum(light.kind == "directional" and light.sky is None for light in lights),
-        soft_spots=any(light.beam is not None for light in lights),
-        area_lights=tuple(light.kind for light in area_lights),
-        concave=tuple(mesh.name for mesh in bodies.meshes),
-        uneven=_uneven(medium),
-        sky=next((_axis_name(light) for light in lights if light.sky is not None), ""),
         notes=tuple(dict.fromkeys(notes)),
     )
-
-
-def _uneven(medium: Medium) -> int:
-    """Return how many clouds have a grid of densities."""
-    if medium.clouds is None or medium.clouds.density is None:
-        return 0
-    return int(np.count_nonzero(np.isfinite(np.array(medium.clouds.density.voxel))))
 
 
 def _axis_name(light: Light) -> str:
@@ -366,38 +325,25 @@ def scene_notes(scene, *, clouds: bool = True) -> list[str]:
     return notes
 
 
-def describe(features: SceneFeatures) -> dict[str, str]:
-    """Return the features in words, one entry for each decision."""
-    counts = (
-        ("point", features.point_lights),
-        ("spot", features.spot_lights),
-        ("directional", features.directional_lights),
-    )
-    lights = [f"{count} {kind}" for kind, count in counts if count]
-    lights += [f"{count} {shape} with extent" for shape, count in Counter(features.area_lights).items()]
-    lights += [f"a sky, as a beam from {features.sky}"] if features.sky else []
-    words = {
-        "surfaces": "lit surfaces" if features.surfaces else "none: no ray is cast for the camera",
-        "shadows": "visibility tests" if features.shadows else "none: nothing casts a shadow",
+def describe(scene: Scene) -> dict[str, str]:
+    """Return in words what a scene needs, one entry for each decision about the code that a frame runs."""
+    counts = Counter(light.kind for light in scene.lights if light.sky is None)
+    lights = [f"{counts[kind]} {kind}" for kind in ("point", "spot", "directional") if counts[kind]]
+    extents = Counter(light.kind for light in scene.area_lights)
+    lights += [f"{count} {shape} with extent" for shape, count in extents.items()]
+    lights += [f"a sky, as a beam from {_axis_name(light)}" for light in scene.lights if light.sky is not None]
+    isotropic = all(phase.constant for phase in scene.medium.phases)
+    soft = any(light.beam is not None for light in scene.lights)
+    return {
+        "surfaces": "lit surfaces" if scene.features.surfaces else "none: no ray is cast for the camera",
+        "shadows": "visibility tests" if scene.features.shadows else "none: nothing casts a shadow",
         "extinction": "one for all channels"
-        if features.extinctions == 1
+        if scene.medium.channels == 1
         else "one for each channel: three integrals a ray",
         "phase function": "isotropic: left out of the integrand"
-        if features.isotropic
+        if isotropic
         else "anisotropic: split at the foot point",
-        "medium": f"{len(features.concave)} clouds in vacuum, bounded by meshes: rays cast at them"
-        + f", {features.uneven} with a grid of densities: marched" * bool(features.uneven)
-        if features.concave
-        else f"bounded, in {'vacuum' if features.clear else 'another medium'}: rays clipped, no kernel"
-        if features.bounded
-        else "height fog: depths and suns in closed form, panels of nodes for lights at places"
-        if features.height_fog
-        else "a density grid: marched, depths from cell to cell"
-        if features.grid
-        else "unbounded: every ray lies in it whole",
+        "medium": scene.medium.summary,
         "lights": " and ".join(lights),
-        "spot falloff": "inside the cone: integrand weighted"
-        if features.soft_spots
-        else "none: rays are clipped to cones at most",
+        "spot falloff": "inside the cone: integrand weighted" if soft else "none: rays are clipped to cones at most",
     }
-    return words

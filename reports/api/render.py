@@ -300,7 +300,7 @@ def _frame(asked: _Asked, samples: int, timed: bool, progress: Progress) -> "Ren
         parameters=dict(chosen.parameters),
         label=chosen.label,
         precision=asked.precision,
-        plan=describe(read.features),
+        plan=describe(read),
         notes=(*read.features.notes, *warnings),
         times=times,
         samples=samples,
@@ -395,7 +395,7 @@ def _plan(asked: _Asked) -> "Said":
     from airlight.reports.tables.record import Said
 
     loaded, read = asked.read()
-    words, notes = describe(read.features), read.features.notes
+    words, notes = describe(read), read.features.notes
     lines = [*(f"{name}: {said}" for name, said in words.items()), *notes]
     return Said(name=loaded.name, data={"plan": words, "notes": list(notes)}, lines=lines)
 

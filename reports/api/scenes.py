@@ -109,5 +109,5 @@ def _from_mitsuba(scene: Any) -> OpenScene:
 def _described(loaded: OpenScene) -> tuple[dict[str, str], tuple[str, ...]]:
     from airlight.realtime.scene.read_scene import describe, read_scene
 
-    features = read_scene(loaded.scene).features
-    return describe(features), features.notes
+    read = read_scene(loaded.scene)
+    return describe(read), read.features.notes

@@ -43,7 +43,7 @@ def write_scene(result: SceneResult, folder: Path) -> Scene:
         path=str(study.loaded.path) if study.loaded.path else None,
         size=study.size,
         timed=study.study.measure.timed_size or study.size,
-        plan=describe(study.scene.features),
+        plan=describe(study.scene),
         notes=tuple(study.scene.features.notes),
         reference=reference_record(reference),
         exposure=factor,

@@ -168,7 +168,7 @@ def methods(
     for scene, tell in scene_by_scene(loaded, "methods", progress):
         measure = Measure("stages", seconds, every_metric=False)
         read, _, cell = cells_of(scene, measure, apart=apart)
-        useful, measured = configurations_for(read.features, chosen), list[tuple[Any, Any]]()
+        useful, measured = configurations_for(read, chosen), list[tuple[Any, Any]]()
         for at, each in enumerate(useful):
             tell(0.5 * at / len(useful), each.label)
             measured.append(cell(each))
@@ -285,7 +285,7 @@ def _split(loaded: Any, chosen: list[Any], measure: Any, *, apart: bool, progres
         return frame.airlight
 
     split: Split = []
-    useful = configurations_for(scene.features, chosen)
+    useful = configurations_for(scene, chosen)
     for at, each in enumerate(useful):
         progress((1 + at) / (1 + len(useful)), each.label)
         try:

@@ -21,7 +21,7 @@ from airlight.realtime.frame.renderer import Frame, FrameRenderer, Stages, image
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.methods.shader.method import Shader
 from airlight.realtime.parameters import defaults
-from airlight.realtime.scene.read_scene import read_again, read_scene
+from airlight.realtime.scene.read_scene import describe, read_again, read_scene
 from airlight.validation.clock import timed
 from airlight.validation.scenes.changes import Values, change_scene, changeable, isotropic_media
 from airlight.validation.scenes.loading import load_scene
@@ -154,7 +154,7 @@ class LiveScene:
         self.chosen, self.renderer, self._other_method = chosen, made, True
         for key in [key for key in self._renderers if key[0].method == chosen.method]:
             del self._renderers[key]
-        self._renderers[chosen, self.scene.features] = made
+        self._renderers[chosen, self._code()] = made
 
     def change(self, changes: Mapping[str, Values]) -> None:
         """Change the scene; names that are not given are as they were. If scene or method refuse, all is as it was."""
@@ -209,9 +209,13 @@ class LiveScene:
         """Bring a frame to the host in the order of the image."""
         return image_frame(replace(self.renderer, scene=self.scene), shown.stages)
 
+    def _code(self) -> tuple[Any, ...]:
+        """Return a key of the code that the scene needs: a change may add or take a channel, or a light's falloff."""
+        return (*describe(self.scene).values(), self.scene.medium.vacuum)
+
     def _find_renderer(self) -> FrameRenderer:
-        """Return the renderer of the configuration for a scene with these features."""
-        key = self.chosen, self.scene.features
+        """Return the renderer of the configuration for the scene as it is now."""
+        key = self.chosen, self._code()
         if key not in self._renderers:
             made = prepared(self.scene, self.chosen)
             self._renderers[key] = self._with_known_surface(made) if len(made.structures) == 1 else made
@@ -222,7 +226,7 @@ class LiveScene:
 
     def _with_known_surface(self, made: FrameRenderer) -> FrameRenderer:
         """Return a renderer that casts and shades by the functions that another one has recorded."""
-        key = self.scene.features, made.method.provides_visibility, made.method.by_source
+        key = self._code(), made.method.provides_visibility, made.method.by_source
         known = self._surfaces.setdefault(key, made)
         structures = {
             lights: replace(stages, surface=known.stages.surface, shade=known.stages.shade)

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from airlight.realtime.kernels.registry import KERNELS
-from airlight.realtime.scene.read_scene import Scene, SceneFeatures, read_scene
+from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.quadrature.ray_values import ReferenceImage
 from airlight.validation.columns import plain
 from airlight.validation.estimates.quadrature import reference_image
@@ -67,10 +67,10 @@ def read_baseline(scene: str) -> Baseline | None:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
-def baseline_configurations(name: str, features: SceneFeatures) -> tuple[Configuration, ...]:
+def baseline_configurations(name: str, scene: Scene) -> tuple[Configuration, ...]:
     """Return what the baseline of a scene holds: the standard configurations, and every kernel in one scene."""
     kernels = [Configuration("unshadowed", kernel) for kernel in KERNELS] if name == FOG else []
-    return tuple(dict.fromkeys((*configurations_for(features, STANDARD), *kernels)))
+    return tuple(dict.fromkeys((*configurations_for(scene, STANDARD), *kernels)))
 
 
 def measure_baseline(name: str) -> dict[str, Any]:
@@ -78,7 +78,7 @@ def measure_baseline(name: str) -> dict[str, Any]:
     loaded = load_scene(name, SIZE)
     scene = read_scene(loaded.scene)
     reference = reference_image(loaded.scene)
-    chosen = baseline_configurations(name, scene.features)
+    chosen = baseline_configurations(name, scene)
     return {
         "scene": name,
         "size": list(SIZE),

@@ -140,9 +140,7 @@ def with_copies(scene: Scene, copies: int) -> Scene:
     """Return a scene in which each light without extent stands several times, with its fraction of the intensity."""
     here = np.array(scene.camera.origin, dtype=np.float64).ravel()
     lights = tuple(_copy(light, number, copies, here) for light in scene.lights for number in range(copies))
-    kinds = [light.kind for light in lights]
-    counts: dict[str, Any] = {f"{kind}_lights": kinds.count(kind) for kind in ("point", "spot", "directional")}
-    return replace(scene, lights=lights, features=replace(scene.features, **counts))
+    return replace(scene, lights=lights)
 
 
 def _copy(light: Light, number: int, copies: int, camera) -> Light:

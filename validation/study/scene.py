@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.clock import Spent
-from airlight.realtime.scene.read_scene import Scene, SceneFeatures, read_scene
+from airlight.realtime.scene.read_scene import Scene, read_scene
 from airlight.reference.quadrature.ray_values import ReferenceImage
 from airlight.reference.storage.exr import TOTAL, Image
 from airlight.reference.storage.scene_digest import scene_content, scene_digest
@@ -104,7 +104,7 @@ class SceneStudy:
     @cached_property
     def configurations(self) -> tuple[Configuration, ...]:
         """The configurations to measure."""
-        return configurations_for(self.scene.features, self.study.configurations)
+        return configurations_for(self.scene, self.study.configurations)
 
     @property
     def name(self) -> str:
@@ -339,15 +339,15 @@ def study_scene(
     return SceneResult(study, reference.value, agreement.value, multiple.value, tuple(rows), seconds, results)
 
 
-def configurations_for(features: SceneFeatures, configurations: Sequence[Configuration]) -> tuple[Configuration, ...]:
+def configurations_for(scene: Scene, configurations: Sequence[Configuration]) -> tuple[Configuration, ...]:
     """Return the configurations that differ in this scene from the ones before them.
 
     Variants of the shadows are left out if nothing casts a shadow. The published treatment of bounded media is left out
     if the scene has none, or if they do not lie in vacuum, and so are light samples where there is no area light.
     """
-    without_effect = set() if features.shadows else {"shadow", "order", "map"}
-    without_effect |= set() if features.clear else {"media"}
-    without_effect |= set() if features.area_lights else {"points", "pattern"}
+    without_effect = set() if scene.features.shadows else {"shadow", "order", "map"}
+    without_effect |= set() if scene.medium.clear else {"media"}
+    without_effect |= set() if scene.area_lights else {"points", "pattern"}
     return tuple(chosen for chosen in configurations if not without_effect & set(dict(chosen.parameters)))
 
 

@@ -41,7 +41,7 @@ def check_scene(scene: Scene, name: str) -> None:
     medium = scene.medium
     wanted = f"{name} renders point and spot lights in one homogeneous medium without bounds"
     if medium.bounded_media or not isinstance(medium, Homogeneous):
-        what = "is height fog" if scene.features.height_fog else "is a grid" if scene.features.grid else "has bounds"
+        what = "has bounds" if medium.bounded_media or medium.clouds else f"is {medium.summary.partition(':')[0]}"
         raise InputError(f"the medium {what}: {wanted}; use ray-march, or write the method in Python")
     if medium.vacuum:
         raise InputError(f"nothing is extinguished in a channel, so that rays have no end: {wanted} of sigma_t above 0")

@@ -14,6 +14,7 @@ With these every method of lit intervals, the marchers, soft shafts, froxels, su
 airlight of a segment has 16 Gauss-Legendre nodes in w = asinh((x - foot)/height) on each side of the foot, and paths to
 lights their `optical_depth`. It may write, because it knows better,
 
+- `summary`, in words for the user, and `phases` where it has several;
 - `lit`: rays with a light, a class derived from `LitRays` that has its own `airlight(x0, x1)`: a closed form, panels
   where the medium is thick, a kernel (`realtime.kernels` are those of the homogeneous medium);
 - `depth_to_light`: of whole paths from points to a light;

@@ -12,6 +12,7 @@ from functools import reduce
 from typing import Any
 
 import drjit as dr
+import numpy as np
 
 from airlight.realtime.errors import InputError
 from airlight.realtime.scene.density import Density
@@ -31,6 +32,11 @@ class Clouds:
     phase: Any  #: the number of each cloud's phase function
     density: Density | None = None  #: from place to place; None where all clouds are homogeneous
 
+    @property
+    def grids(self) -> int:
+        """How many clouds have a grid of densities."""
+        return 0 if self.density is None else int(np.count_nonzero(np.isfinite(np.array(self.density.voxel))))
+
 
 @dataclass(frozen=True)
 class BoundedMedia(Homogeneous):
@@ -39,6 +45,21 @@ class BoundedMedia(Homogeneous):
     bounded_media: tuple[BoundedMedium, ...] = ()
     clear: bool = False
     clouds: Clouds | None = None
+
+    @property
+    def summary(self):
+        """Clouds where not all bounds are convex or not all media homogeneous."""
+        if self.clouds is None or self.bounded_media:
+            return f"bounded, in {'vacuum' if self.clear else 'another medium'}: rays clipped, no kernel"
+        grids = self.clouds.grids
+        words = f"{dr.width(self.clouds.phase)} clouds in vacuum, bounded by meshes: rays cast at them"
+        return words + (f", {grids} with a grid of densities: marched" if grids else "")
+
+    @property
+    def phases(self):
+        """The phase functions of the bounded media, and of the medium around them."""
+        bounded = self.clouds.phases if self.clouds else [own.medium.phase for own in self.bounded_media]
+        return (*bounded, *(() if self.clear else (self.phase,)))
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances at which they enter and leave each medium [m]."""

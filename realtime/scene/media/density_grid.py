@@ -31,6 +31,7 @@ class GridMedium(VaryingMedium):
     albedo: Any
     phase: Phase
     sums_depth = True
+    summary = "a density grid: marched, depths from cell to cell"
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances at which they enter and leave the box [m]."""

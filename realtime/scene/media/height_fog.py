@@ -75,6 +75,7 @@ class HeightFog(VaryingMedium):
     up: Any  #: unit vector
     albedo: Any
     phase: Phase
+    summary = "height fog: depths and suns in closed form, panels of nodes for lights at places"
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances between which they are in the fog [m], and their heights and rise."""

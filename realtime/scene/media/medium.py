@@ -52,6 +52,16 @@ class Medium(ABC):
     clouds: Any = None  #: in vacuum: all bounded media, of any shape, for methods that render clouds
 
     @property
+    def summary(self) -> str:
+        """Say in words for the user which medium it is, and how it is rendered."""
+        return "unbounded: every ray lies in it whole"
+
+    @property
+    def phases(self) -> Sequence[Any]:
+        """The phase functions in it."""
+        return (self.phase,)
+
+    @property
     @abstractmethod
     def channels(self) -> int:
         """1 for a grey medium, 3 for a coloured one."""

@@ -14,7 +14,7 @@ from airlight.realtime.methods.registry import FOG_METHODS, METHODS
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.closed_mesh import closed_mesh, encloses
 from airlight.realtime.scene.density import DensityGrid, density_at, density_on_device, read_density
-from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.scene.read_scene import describe, read_scene
 from airlight.validation.scenes.meshes import box, joined, placed, torus
 from tests.helpers.clouds import DROPLETS, SUN, TURN, cloud, cloud_of, cloud_scene, dense, linear_between, loaded, ring
 
@@ -153,7 +153,7 @@ def test_a_hollow_cloud_and_a_cloud_in_its_hollow_are_taken():
     )
     core = placed(torus(101.0, 5.0, (23, 17)), (0, 0, 0))
     read = read_scene(loaded(sun=SUN, shell=cloud("shell", shell), core=cloud("core", core)))
-    assert read.features.concave == ("shell", "core")
+    assert describe(read)["medium"] == "2 clouds in vacuum, bounded by meshes: rays cast at them"
     mesh = closed_mesh("shell", *shell)
     assert [encloses(mesh, np.array([x, 0.3, 0.1])) for x in (101.0, 125.0, 150.0, 0.0)] == [False, True, False, False]
 
@@ -164,4 +164,4 @@ def test_a_camera_in_a_cloud_references_it():
     medium = mi.load_dict(DROPLETS)
     scene = cloud_scene(origin=tuple(WITHIN), sun=SUN, ring=cloud_of("ring", ring(), medium))
     scene["sensor"]["medium"] = medium
-    assert read_scene(mi.load_dict(scene)).features.concave == ("ring",)
+    assert not read_scene(mi.load_dict(scene)).medium.bounded_media

@@ -12,7 +12,7 @@ from airlight.errors import InputError
 from airlight.realtime.frame.renderer import render_frame
 from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.scene.camera import pixel_grid, ray_directions, resized_camera, row_and_column, sensor_camera
-from airlight.realtime.scene.read_scene import read_scene
+from airlight.realtime.scene.read_scene import describe, read_scene
 from airlight.realtime.scene.rounding import check_rounding
 from airlight.validation.scenes.height_fog import register_height_fog
 from airlight.validation.scenes.loading import load_scene
@@ -41,16 +41,20 @@ def test_every_opaque_shape_stays_whatever_its_name(variant, names):
 
 @pytest.mark.claim("not-needed-costs-nothing")
 def test_plan_names_only_what_is_needed(variant):
-    features = read(ball=None, floor=None).features
-    assert not features.shadows
-    assert not features.surfaces
-    assert features.extinctions == 1
-    assert features.isotropic
-    assert (features.point_lights, features.spot_lights, features.soft_spots, features.vacuum) == (1, 0, False, False)
-    features = read(spot=spot(beam=20.0)).features
-    assert features.shadows
-    assert features.soft_spots
-    assert not read(spot=spot()).features.soft_spots
+    plan = describe(read(ball=None, floor=None))
+    assert plan == {
+        "surfaces": "none: no ray is cast for the camera",
+        "shadows": "none: nothing casts a shadow",
+        "extinction": "one for all channels",
+        "phase function": "isotropic: left out of the integrand",
+        "medium": "unbounded: every ray lies in it whole",
+        "lights": "1 point",
+        "spot falloff": "none: rays are clipped to cones at most",
+    }
+    plan = describe(read(spot=spot(beam=20.0)))
+    assert (plan["shadows"], plan["lights"]) == ("visibility tests", "1 point and 1 spot")
+    assert plan["spot falloff"] == "inside the cone: integrand weighted"
+    assert describe(read(spot=spot()))["spot falloff"] == "none: rays are clipped to cones at most"
 
 
 @pytest.mark.claim("glossy-surfaces-noted")

@@ -107,7 +107,7 @@ def test_copies_of_a_light_stand_near_it_and_have_its_intensity_together(variant
     scene = read_scene(load_scene("sphere-spot", (8, 6)).scene)
     (light,) = scene.lights
     more = with_copies(scene, 4)
-    assert (len(more.lights), more.features.spot_lights, more.features.point_lights) == (4, 4, 0)
+    assert [light.kind for light in more.lights] == ["spot"] * 4
     place, eye = (np.array(each, dtype=float).ravel() for each in (light.position, scene.camera.origin))
     total = sum(np.array(each.intensity, dtype=float) for each in more.lights)
     np.testing.assert_allclose(total, np.array(light.intensity, dtype=float), rtol=1e-6)
@@ -129,7 +129,7 @@ def test_copies_of_a_light_from_infinity_are_turned(variant):
     axes = [np.array(each.exact_axis, dtype=float).ravel() for each in more.lights]
     turned = [rotation((0.31, 0.53, 0.79), 2.3 * number) @ axes[0] for number in range(3)]
     np.testing.assert_allclose(axes, turned, atol=1e-6)
-    assert more.features.directional_lights == 3
+    assert [light.kind for light in more.lights] == ["directional"] * 3
 
 
 def test_sizes_are_halves_to_four_times_the_width(variant):

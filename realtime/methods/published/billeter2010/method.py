@@ -59,7 +59,7 @@ class LightVolumes2010(Method):
 
     def check(self, scene):
         """Refuse bounded media, and more memory than the machine has."""
-        if scene.features.bounded:
+        if scene.medium.bounded_media:
             raise InputError(
                 f"method {self.name}: the scene has a medium with bounds, expected one medium that fills all space; "
                 "use light-volumes"

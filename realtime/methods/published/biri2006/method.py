@@ -143,7 +143,7 @@ class ShadowPlanes2006(Method):
 
     def check(self, scene):
         """Refuse a constant R without bounds, and bounded media that vertices cannot have."""
-        if scene.features.bounded and self.evaluation == "vertex":
+        if scene.medium.bounded_media and self.evaluation == "vertex":
             check_vertices(scene.medium, scene.lights)
 
     def airlight(self, view, light, state, kernel):
@@ -170,7 +170,7 @@ class ShadowPlanes2006(Method):
 
     def _lit(self, view: View, light: Light, kernel) -> LitRays:
         """Return the rays with one light, in bounded media by the form that is asked for."""
-        if self.media == "exact" or not view.features.bounded:
+        if self.media == "exact" or not view.medium.bounded_media:
             return view.lit_by(light, kernel)
         return constant_rays(view, light, kernel, self.media)
 
@@ -211,7 +211,7 @@ class ShadowPlanes2006(Method):
         # Planes take the place of a cone whose intensity does not fall within it.
         cone = bool(self.cone and light.cone is not None and not light.varies)
         airlight = self._lit(view, light.without_cone() if cone else light, kernel)
-        if view.features.bounded and self.evaluation == "vertex":
+        if view.medium.bounded_media and self.evaluation == "vertex":
             start = type(view.medium.albedo)(0) if start is None else start
             assert isinstance(airlight, BoundedRays)
             total = sum_in_media(

@@ -31,7 +31,7 @@ def test_both_readers_take_what_was_drawn(variant, seeds):
         assert len(reference.lights) + len(reference.area) + len(reference.directional) == len(drawn["lights"])
         bounded = [medium for medium in drawn["media"] if medium["bounds"] != "unbounded"]
         assert len(reference.media) == len(bounded)
-        assert ours.features.clear == (len(bounded) == len(drawn["media"]))
+        assert ours.medium.clear == (len(bounded) == len(drawn["media"]))
         # The drawn values arrive in single precision, as the scene has it.
         sigma = {medium.name: medium.sigma_t for medium in reference.media} | {"unbounded": reference.medium.sigma_t}
         for medium in drawn["media"]:
