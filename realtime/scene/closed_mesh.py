@@ -55,8 +55,19 @@ class ClosedMesh:
 def closed_mesh(name: str, vertices: Array, faces: NDArray[Any]) -> ClosedMesh:
     """Return a mesh with its doubled vertices joined.
 
-    `name`: for messages; `vertices`: positions [m], (vertices, 3); `faces`: vertex numbers, counter-clockwise seen from
-    outside, (faces, 3). Raises InputError where an edge is not met once each way, with its name.
+    Parameters
+    ----------
+    name
+        For messages.
+    vertices
+        Positions, (vertices, 3) [m].
+    faces
+        Vertex numbers, counter-clockwise seen from outside, (faces, 3).
+
+    Raises
+    ------
+    InputError
+        Where an edge is not met once each way, with its name.
     """
     joined, own, number = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
     mesh = ClosedMesh(name, joined, number.reshape(-1)[np.asarray(faces, dtype=np.int64)], own)
@@ -136,9 +147,22 @@ class Bounds:
 def read_bounds(shape) -> tuple[Bounds | None, ClosedMesh | None]:
     """Read the bounds of a medium from a shape.
 
-    `shape`: a Mitsuba shape. Returns `bounds`: its convex bounds; None where it is not convex; `mesh`: its triangles;
-    None for a sphere. Raises InputError for a shape that is neither a sphere nor a closed mesh with its normals
-    outwards, with its name.
+    Parameters
+    ----------
+    shape
+        A Mitsuba shape.
+
+    Returns
+    -------
+    bounds
+        Its convex bounds, None where it is not convex.
+    mesh
+        Its triangles, None for a sphere.
+
+    Raises
+    ------
+    InputError
+        For a shape that is neither a sphere nor a closed mesh with its normals outwards, with its name.
     """
     name = shape.id()
     if shape.class_name() == "Sphere":
@@ -167,7 +191,10 @@ def _read_sphere(shape) -> Bounds:
 def mesh_bounds(mesh: ClosedMesh) -> Bounds | None:
     """Return the bounds that a mesh describes, None where it is not convex.
 
-    Raises InputError for a mesh that is inside out or flat.
+    Raises
+    ------
+    InputError
+        For a mesh that is inside out or flat, with its name.
     """
     from scipy.spatial import ConvexHull
 

@@ -126,11 +126,22 @@ def read_cloud_density(medium: Any, mesh: ClosedMesh) -> DensityGrid:
 
 
 def read_density(medium: Any, name: str) -> DensityGrid:
-    """Return the grid of a Mitsuba medium; messages call it by `name`.
+    """Return the grid of a Mitsuba medium.
 
-    Raises InputError for a `heterogeneous` medium whose extinction is no grid of one channel, linear between voxels, or
-    whose albedo is not the same everywhere.
+    Parameters
+    ----------
+    medium
+        A `heterogeneous` medium.
+    name
+        The name of the medium in messages.
+
+    Raises
+    ------
+    InputError
+        For an extinction that is no grid of one channel, linear between voxels, with finite values of 0 or more, and
+        for an albedo that differs from place to place.
     """
+    # The extinction is on a grid and nothing else is.
     parameters = mi.traverse(medium)
     if "sigma_t.data" not in parameters:
         raise InputError(f"{name} has an extinction that is no grid; expected a 'gridvolume' as sigma_t")
@@ -138,6 +149,8 @@ def read_density(medium: Any, name: str) -> DensityGrid:
         raise InputError(
             f"{name} has an albedo that differs from place to place; expected one number or colour: a 'constvolume'"
         )
+
+    # One channel of finite values, of which one at least is above 0.
     values = np.array(parameters["sigma_t.data"], dtype=np.float32)
     if values.ndim == 4 and values.shape[3] > 1:
         raise InputError(
@@ -156,6 +169,8 @@ def read_density(medium: Any, name: str) -> DensityGrid:
         raise InputError(f"{name} has the scale {scale:g}; expected a finite number of 0 or more")
     if not largest * scale > 0:
         raise InputError(f"{name} is empty: its grid is 0 everywhere; expected densities above 0 somewhere")
+
+    # The largest value is that of the extinction; what is read has to be what Mitsuba reads.
     values /= np.float32(largest)
     grid = DensityGrid(values, largest * scale, _transform(medium, name))
     _compare(name, medium, grid)
@@ -267,17 +282,29 @@ def density_at(values: NDArray[np.float32], fraction: Array) -> Array:
 
 
 def density_on_device(grids: list[DensityGrid | None], types: ArrayTypes) -> Density:
-    """Return the density of clouds by their grids, None for a homogeneous one.
+    """Return the density of clouds on the device.
 
-    Raises InputError for more voxels than Dr.Jit counts, or than memory holds.
+    Parameters
+    ----------
+    grids
+        By cloud its grid, None for a homogeneous one.
+    types
+        Array types to compute with.
+
+    Raises
+    ------
+    InputError
+        For more voxels than Dr.Jit counts, or than memory holds.
     """
     shapes = [(1, 1, 1) if grid is None else grid.values.shape for grid in grids]
     first = np.cumsum([0, *(math.prod(shape) for shape in shapes)])
     words, advice = f"density grids of {first[-1]} voxels in all", "use coarser grids"
     if 4 * first[-1] >= 2**32:
         raise InputError(f"{words}; expected fewer than {2**30}, which Dr.Jit can count: {advice}")
+
     # Four numbers on the device and on the way there, the grid itself, and a copy of it.
     check_memory(words, int(first[-1]) * (4 * bytes_of(types.scalar) + 6 * 4), advice)
+
     table = np.empty((first[-1], 4), dtype=np.float32)
     counts, rows, voxels = [], [], []
     for grid, shape, begin in zip(grids, shapes, first, strict=False):
@@ -288,6 +315,7 @@ def density_on_device(grids: list[DensityGrid | None], types: ArrayTypes) -> Den
         for number, (down, along) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
             y, x = (np.minimum(np.arange(n) + step, n - 1) for n, step in zip(shape[1:], (down, along), strict=True))
             np.take(values[:, y], x, axis=2, out=corners[..., number])
+        # From places to voxels, whole numbers at their centres; a homogeneous cloud has one voxel, wherever one asks.
         to_grid = np.zeros((3, 4)) if grid is None else grid.to_grid
         to_voxels = to_grid * np.array(count)[:, None]
         to_voxels[:, 3] -= 0.5

@@ -30,10 +30,15 @@ _MARGIN = 1.001  # so that rounding leaves nothing outside
 
 
 def media_spheres(boundaries: Sequence[Any]) -> Array:
-    """Return spheres whose hull holds what Mitsuba's shapes bound: middles and radii [m], (spheres, 4).
+    """Return spheres whose hull holds media: middles and radii, (spheres, 4) [m].
 
     Numbers are rounded, and the spheres grown by as much: what the precision of the media puts in their last digits
     must not move the rays of a map.
+
+    Parameters
+    ----------
+    boundaries
+        Mitsuba's shapes around the media, spheres or closed meshes, one or more.
     """
     from scipy.spatial import ConvexHull
 
@@ -47,10 +52,15 @@ def media_spheres(boundaries: Sequence[Any]) -> Array:
 
 
 def shape_spheres(shapes) -> Array:
-    """Return spheres about Mitsuba's shapes, as `media_spheres` does, for a medium without sides.
+    """Return spheres about shapes, (spheres, 4) [m], for a medium without sides.
 
     They are larger than the shapes by a twentieth of them all: at the border of a map nothing stands, so that what lies
     beyond it is lit.
+
+    Parameters
+    ----------
+    shapes
+        Mitsuba's opaque shapes; without any the rectangle is that of a sphere of 1 m about the origin.
     """
     spheres = np.array([_sphere_about(shape) for shape in shapes] or [np.array([0.0, 0.0, 0.0, 1.0])])
     size = np.ptp(spheres[:, :3], axis=0).max() + spheres[:, 3].max()
@@ -72,8 +82,14 @@ def _rounded(spheres: Array) -> Array:
 def distance_before(spheres: Array, shapes) -> float:
     """Return the distance from the middle of the media beyond which nothing lies [m].
 
-    `spheres` are those of `media_spheres`, `shapes` Mitsuba's. An object that turns about the middle of its box stays
-    within the sphere about the box.
+    An object that turns about the middle of its box stays within the sphere about the box.
+
+    Parameters
+    ----------
+    spheres
+        About the media, from `media_spheres` or `shape_spheres` [m].
+    shapes
+        Mitsuba's opaque shapes.
     """
     middle = _middle(spheres)
     everything = np.vstack([spheres, *(_sphere_about(shape) for shape in shapes)])
@@ -84,10 +100,18 @@ def distance_before(spheres: Array, shapes) -> float:
 def directional_fields(axis: Array, spheres: Array, back: float, types: ArrayTypes) -> dict[str, Any]:
     """Return the fields of a directional `Light` that follow from where it comes from and what it lights.
 
-    `axis`: unit vector in which the light travels; `spheres`, `back`: from `media_spheres` and `distance_before` [m];
-    `types`: of the arrays.
-
     Valid for any axis. All but the axis is rounded to float32 in any precision, so that its map is the same in all.
+
+    Parameters
+    ----------
+    axis
+        Unit vector in which the light travels.
+    spheres
+        About the media, from `media_spheres` or `shape_spheres` [m].
+    back
+        From `distance_before` [m].
+    types
+        Array types of the fields.
     """
     middle = _middle(spheres)
     across, up, corner = _least_rectangle(axis, spheres[:, :3] - middle, spheres[:, 3])

@@ -70,9 +70,17 @@ class Occluders:
 def read_occluders(scene, area_lights: Sequence[AreaLight] = ()) -> Occluders:
     """Read the triangles of a Mitsuba scene.
 
-    `scene`: an `mi.Scene`; shapes whose surface lets light pass (`null`) cast no shadow; `area_lights`: its lights with
-    extent: those that are opaque have triangles even where their shapes have none. Raises InputError for a shape that
-    has no triangles, with its name.
+    Parameters
+    ----------
+    scene
+        An `mi.Scene`; shapes whose surface lets light pass (`null`) cast no shadow.
+    area_lights
+        Its area lights: opaque ones have triangles even where their shapes have none.
+
+    Raises
+    ------
+    InputError
+        For a shape that has no triangles, with its name.
     """
     lights = {light.name: light for light in area_lights}
     meshes = []
@@ -90,8 +98,12 @@ def read_occluders(scene, area_lights: Sequence[AreaLight] = ()) -> Occluders:
 def make_occluders(meshes: Sequence[tuple[str, Array, NDArray[Any]]]) -> Occluders:
     """Return the occluders of meshes.
 
-    `meshes`: (name, vertices (n, 3) [m], triangles (m, 3)) each. Triangles with a vertex twice and repeated ones are
-    left out, the latter with a warning.
+    Triangles with a vertex twice and repeated ones are left out, the latter with a warning.
+
+    Parameters
+    ----------
+    meshes
+        By mesh its name, its vertices (n, 3) [m] and the vertex numbers of its triangles (m, 3).
     """
     names = tuple(name for name, _, _ in meshes)
     vertices, vertex_shape, vertex_source, triangles = _joined(meshes)
@@ -122,7 +134,13 @@ def make_occluders(meshes: Sequence[tuple[str, Array, NDArray[Any]]]) -> Occlude
 
 
 def with_positions(occluders: Occluders, positions: Mapping[str, Array]) -> Occluders:
-    """Return the occluders with the vertices of some shapes elsewhere; `positions` are those of the shapes [m]."""
+    """Return the occluders with the vertices of some shapes elsewhere.
+
+    Parameters
+    ----------
+    positions
+        By name of a shape, all of its vertices (n, 3) [m].
+    """
     if not positions:
         return occluders
     vertices = occluders.vertices.copy()

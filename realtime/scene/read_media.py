@@ -95,9 +95,22 @@ def opaque_scene(scene, opaque):
 def read_medium(sensor, boundaries, types: ArrayTypes) -> Medium:
     """Return the medium of a scene with the bounded media in it.
 
-    `sensor`: Mitsuba's sensor; `boundaries`: the shapes that bound media; `types`: array types to compute with. The
-    medium has `clouds` in vacuum, whatever the bounds, and `bounded_media` only where all bounds are convex and all
-    media homogeneous. Raises InputError for media that no method can render, with the name of what is in the way.
+    It has `clouds` in vacuum, whatever the bounds, and `bounded_media` only where all bounds are convex and all media
+    homogeneous.
+
+    Parameters
+    ----------
+    sensor
+        Mitsuba's sensor.
+    boundaries
+        The shapes that bound media.
+    types
+        Array types to compute with.
+
+    Raises
+    ------
+    InputError
+        For media that no method can render, with the name of what is in the way.
     """
     if not boundaries:
         if sensor.get_medium() is None:

@@ -197,21 +197,30 @@ def wedge_lists(
             f"a light has {len(planes.gain)} shadow planes of up to {gain} layers; expected up to "
             f"{NUMBER + 1} of {GAIN_ZERO - 1}: use simpler occluders, or light-volumes"
         )
+
+    # As many wedges as make a plane span a few on average; a wedge lists every plane that it meets.
     span = np.minimum(planes.last, TURN) - np.maximum(planes.first, 0)
     count = int(np.clip(2 ** np.ceil(np.log2(_FINE * TURN / np.mean(span))), _LEAST, _MOST)) if len(span) else _LEAST
     scale = np.float32(count / TURN)
     plane, wedge = _in_wedges(planes, scale, count)
+
+    # c = A cos(phi) + B sin(phi): in the middle of a wedge for the order, and at both of its borders for the end.
     borders, middles = (host_direction((np.arange(count + 1) + step) / float(scale)).T for step in (0.0, 0.5))
     a, b = planes.lines[:, :2].T
     at_middle = [form[plane] * way[wedge] for form, way in zip((a, b), middles)]
     at_low, at_high = (a[plane] * borders[0][end] + b[plane] * borders[1][end] for end in (wedge, wedge + 1))
     place = np.lexsort((-(at_middle[0] + at_middle[1]) if rank is None else rank[plane], wedge))
+
+    # The largest c in a wedge, divided by the cosine of its width where it may lie between the borders; and of an entry
+    # and all behind it the largest.
     bound = np.maximum(at_low, at_high)
     cos_width = np.sum(borders[:, 1:] * borders[:, :-1], axis=0)
     bound = np.where(bound > 0, bound / cos_width[wedge], bound)
     bound += _SLACK * (np.abs(at_middle[0]) + np.abs(at_middle[1]))
     start = np.concatenate([[0], np.cumsum(np.bincount(wedge, minlength=count))])
     bound = _largest_behind(bound[place], start)
+
+    # An entry packs the number of a plane, its gain, and whether it is at all azimuths of the wedge.
     holds = (planes.first[plane] * scale <= wedge) & (planes.last[plane] * scale >= wedge + 1)
     gained = (planes.gain.astype(np.int64) + GAIN_ZERO) << GAIN_SHIFT
     entries = (plane + gained[plane] + FULL * holds).astype(np.uint32)
@@ -280,6 +289,8 @@ def layers_between(occluders: Occluders, light: Array, basis: LightBasis, *, use
         start = camera = basis.origin
         direction, reach = axes[2], (-np.inf, 0.0)
         far = np.where(direction == 0, camera, -np.copysign(np.inf, direction))
+
+    # The line meets the boxes of few components, and of those few triangles lie about it.
     low, high = occluders.boxes[:, 0], occluders.boxes[:, 1]
     near = used & np.all((low <= np.maximum(far, camera)) & (high >= np.minimum(far, camera)), axis=1)
     if not near.any():
@@ -288,6 +299,8 @@ def layers_between(occluders: Occluders, light: Array, basis: LightBasis, *, use
     number = number[_beside_axis(occluders, number, start, axes)]
     if not len(number):
         return 0
+
+    # Triangles that the line crosses, by component: those that face the light and those that are averted.
     crossed = number[_crosses(occluders, number, (start, direction), reach)]
     sign = np.sign(occluders.normals[crossed] @ l - w * occluders.offsets[crossed])
     component = occluders.component[crossed]

@@ -74,11 +74,17 @@ def layers(occluders: Occluders, light: Array) -> NDArray[np.int32]:
 def silhouette(occluders: Occluders, light: Array, *, used: NDArray[np.bool_] | None = None) -> Silhouette:
     """Find the silhouette edges.
 
-    `occluders`: triangles with their adjacency; `light`: homogeneous position of the light, (4,), or its place, (3,)
-    [m]; `used`: by component, which ones to look at; all by default.
-
     Valid for closed, open and non-manifold meshes, either winding, and a light inside an occluder (which has then no
     silhouette: all outside is dark, see `realtime.methods.shadow_planes.plane_table.layers_between`).
+
+    Parameters
+    ----------
+    occluders
+        Triangles with their adjacency.
+    light
+        Homogeneous position of the light, (4,), or its place, (3,) [m].
+    used
+        By component, whether to look at it; all by default.
     """
     weight = layers(occluders, light)
     if used is not None and not used.all():
