@@ -42,24 +42,23 @@ class Reservoirs(airlight.Method):
             raise airlight.InputError("reservoirs: needs lights that have a place; remove the directional ones")
 
     def preparation(self, scene):
-        """Return the function that makes tables of the lights: of points, of spots, of samples of area lights."""
-        return lambda now: airlight.light_tables(now.lights)
+        """Return a function of what draws the lights of each table: of points, of spots, of samples of area lights."""
+        return lambda now: tuple(map(airlight.light_choice, airlight.light_tables(now.lights)))
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by chance [W/(m^2 sr)]."""
         total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
-        for first, table in enumerate(state):
-            total += self._reservoir(view, table, stream=first << 16)
+        for first, (table, by_power) in enumerate(zip(view.tables, state, strict=True)):
+            total += self._reservoir(view, table, by_power, stream=first << 16)
         return airlight.Layers(total)
 
-    def _reservoir(self, view, table, stream):
+    def _reservoir(self, view, table, by_power, stream):
         Float, lanes = type(view.distance), dr.width(view.pixel)
-        like = view.lights[table.first]
 
         def step(number, weights, kept, at):
             fraction, place, coin, _ = view.uniform(stream + number)
-            light, probability = table.pick(fraction)
-            color, _ = unshadowed(view, table.light(light, like), place)
+            light, probability = by_power.pick(fraction)
+            color, _ = unshadowed(view, table[light], place)
             weight = dr.mean(color) / probability
             weights = weights + weight
             takes = coin * weights < weight
@@ -71,7 +70,7 @@ class Reservoirs(airlight.Method):
             cond=lambda number, weights, kept, at: number < self.candidates,
             body=step,
         )
-        light = table.light(kept, like)
+        light = table[kept]
         color, point = unshadowed(view, light, at)
         lit = weights > 0
         if view.features.shadows:

@@ -3,14 +3,15 @@
 
 A frame is a list of groups of lights times a list of parts of the image. Each group is run by recorded functions
 (`drjit.freeze`), which record their kernels on the first call and replay them afterwards, so that a frame costs its
-kernels and little else; groups are added up and parts joined. Most frames have one group and one part. A method whose
-arrays change their sizes from frame to frame is not frozen. All that moves (camera, lights, medium, shadow maps) is
-passed in as opaque arrays. `realtime.frame.incremental` says what the next frame uses again.
+kernels and little else; groups are added up and parts joined. A method whose arrays change their sizes from frame to
+frame is not frozen. All that moves (camera, lights, medium, shadow maps) is passed in as opaque arrays.
+`realtime.frame.incremental` says what the next frame uses again.
 
-Groups: a few lights without extent are one group, more are one group each; each sample of an area light is a group.
-Lights of one structure share their recorded functions, so that the code of a kernel, and the time to compile it, do not
-grow with the lights: one kernel for five lights and two media had half a million operations, and took a minute. A
-method that looks at all lights together has one group.
+Lights are tables (`realtime.scene.light_table`), one for each structure and area light. A method that looks at all
+lights together has one group of all tables. Every other method has a group for each light, a table of one row, and
+lights of one structure share a recording: neither the code of a kernel nor the time to compile it grows with the
+lights. Surfaces are shaded by whole tables, in one loop over lights, except where the method says which of its lights
+reaches them.
 
 Parts: a large image of a method that computes each ray by itself is rendered in parts, one after the other: the
 intermediate arrays are then as large as a part. Where the method needs the whole image, its stage is not frozen if the
@@ -19,7 +20,7 @@ intermediate images.
 """
 
 import gc
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, is_dataclass, replace
 from functools import cached_property, reduce
 from operator import add
@@ -42,19 +43,18 @@ from airlight.realtime.numerics.noise import Noise, blue_mask
 from airlight.realtime.numerics.recorded import Frozen, refusals
 from airlight.realtime.parameters import values
 from airlight.realtime.scene.camera import TILE, tiled_pixels
-from airlight.realtime.scene.light_samples import light_samples
+from airlight.realtime.scene.light_table import LightTable, light_samples, light_tables, structure
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.read_scene import Scene
 
 _ROOM = 2**30  # of states of groups of lights, such as shadow maps, and as much of surfaces by group [bytes]
 _LARGE = 2**21  # pixels; a larger image is rendered in parts where it can be
 _PART = 2**20  # pixels of a part at most
-_FEW = 4  # lights without extent whose code one kernel may hold; in bounded media it is long, and only one may
 
 
 @dataclass(frozen=True)
 class Stages:
-    """The recorded functions of a frame for lights of one structure."""
+    """The recorded functions of a frame; each is recorded once for each structure of lights."""
 
     prepare: Preparation  #: scene -> the state of the method: shadow maps, shadow planes
     surface: Callable[..., Any]  #: -> what camera rays meet, and what `shade` returns for it
@@ -65,16 +65,17 @@ class Stages:
 
 @dataclass(frozen=True)
 class LightGroup:
-    """Some lights of a scene, and the functions that render them."""
+    """The lights of a scene that a method renders together."""
 
     scene: Scene  #: with these lights alone
-    stages: Stages
 
-    @property
-    def lights(self) -> tuple[Light, ...]:
-        """The lights for recorded functions: a sample by itself is of no area light, as one recording serves all."""
+    @cached_property
+    def tables(self) -> tuple[LightTable, ...]:
+        """The lights for recorded functions; a sample by itself is of area light 0, as one recording serves all."""
         lights = self.scene.lights
-        return (replace(lights[0], source=0),) if len(lights) == 1 and lights[0].source else lights
+        if len(lights) == 1 and lights[0].source:
+            lights = (replace(lights[0], source=0),)
+        return light_tables(lights)
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class FrameRenderer:
     method: Method
     light_samples: LightSamples
     pixel: PerRay  #: pixel numbers in the order of the lanes
-    structures: Mapping[Any, Stages]  #: by what lights have
+    stages: Stages
     kernel: Any  #: with the tables that it reads; None where the method uses none
     extra_layers: bool  #: whether frames have the further layers that the method names
     sphere_scales: Frozen | None  #: by what samples of sphere lights are scaled
@@ -97,31 +98,33 @@ class FrameRenderer:
     @property
     def by_rays(self) -> bool:
         """Whether any part of the image can be rendered alone."""
-        return self.method.by_rays and not self.method.carries and self.history is None
-
-    @property
-    def shades_apart(self) -> bool:
-        """Whether surfaces are shaded light after light for a method that takes many at once."""
-        method = self.method
-        return method.at_once and not method.provides_visibility and len(self.scene.lights) > _FEW
+        return _by_rays(self.method)
 
     @cached_property
-    def samples(self) -> tuple[Light, ...]:
-        """The light samples of the area lights of the scene as it is now, made once for all stages of a frame."""
-        return light_samples(self.scene, self.light_samples.points, self.light_samples.pattern)
+    def lights(self) -> tuple[Light, ...]:
+        """The lights of the scene as it is now and the samples of its area lights, made once for a frame."""
+        return self.scene.lights + light_samples(self.scene, self.light_samples.points, self.light_samples.pattern)
 
-    @property
-    def stages(self) -> Stages:
-        """The functions of the first group of lights."""
-        return next(iter(self.structures.values()))
+    @cached_property
+    def groups(self) -> tuple[LightGroup, ...]:
+        """The groups of lights of the scene as it is now: all together, or one by one."""
+        together = self.method.at_once or self.extra_layers
+        return light_groups(self.scene, self.lights, together=together)
+
+    @cached_property
+    def shaded(self) -> tuple[tuple[LightTable, ...], ...]:
+        """The tables of lights by which surfaces are shaded: those of the groups where visibility is the method's."""
+        if self.method.provides_visibility:
+            return tuple(group.tables for group in self.groups)
+        return (light_tables(self.lights),)
 
     def prepare(self, scene: Scene) -> tuple[Any, ...]:
         """Return the state of the method by groups of lights, None for those that are not kept."""
         renderer = self if scene is self.scene else replace(self, scene=scene)
         states: list[Any] = []
-        for group in light_groups(renderer):
+        for group in renderer.groups:
             kept = not states or len(states) < kept_groups(states[0])
-            states.append(group.stages.prepare(group.scene) if kept else None)
+            states.append(self.stages.prepare(group.scene) if kept else None)
         return tuple(states)
 
 
@@ -140,7 +143,7 @@ class Rendered:
     """The result of a method, in the order of the lanes, not evaluated."""
 
     airlight: PerRay  #: in-scattered radiance [W/(m^2 sr)]
-    surface: PerRay  #: radiance of the surface through it [W/(m^2 sr)]
+    surface: PerRay | None  #: radiance of the surface through it [W/(m^2 sr)]; None where another group has it
     extra: Mapping[str, PerRay] | None = None  #: further layers by their names
     carried: Any = None  #: for the next frame
 
@@ -157,34 +160,36 @@ def frame_renderer(
     InputError for a parameter that the method does not have, a missing kernel, and a scene that the method refuses;
     refusals that depend on the rays come with the first frame.
     """
-    chosen, light_samples = method_parameters(method, parameters)
+    chosen, samples = method_parameters(method, parameters)
     if chosen.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, expected one of realtime.kernels.registry.KERNELS")
     _check_clouds(scene, chosen)
+    extra_layers &= not scene.area_lights
+    # Groups of one structure need the same memory and are refused alike.
+    lights = scene.lights + light_samples(scene, samples.points, samples.pattern)
+    groups = light_groups(scene, lights, together=chosen.at_once or extra_layers)
+    for group in {tuple(structure(light)[1] for light in each.scene.lights): each for each in groups}.values():
+        chosen.check(group.scene)
     pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
     dr.eval(pixel)
-    made = FrameRenderer(
+    return FrameRenderer(
         scene,
         chosen,
-        light_samples,
+        samples,
         pixel,
-        structures={},
+        stages=_stages(scene, chosen, extra_layers=extra_layers),
         kernel=kernel.prepared(type(scene.camera.origin.x)) if chosen.uses_kernel and kernel else None,
-        extra_layers=extra_layers and not scene.area_lights,
+        extra_layers=extra_layers,
         sphere_scales=sphere_scales(scene, chosen),
         history=HistoryPass(**values(chosen.history), Float=type(scene.camera.origin.x)) if chosen.history else None,
         mask=blue_mask() if chosen.noisy else None,
     )
-    groups = _lights_by_group(made)
-    structures: dict[Any, Stages] = {}
-    if made.shades_apart:
-        for lights in _few_lights(made):
-            structures[_structure(lights)] = _stages(made, replace(scene, lights=lights), alone=False)
-    for lights in groups:
-        key = _structure(lights)
-        if key not in structures:
-            structures[key] = _stages(made, replace(scene, lights=lights), alone=len(groups) == 1)
-    return replace(made, structures=structures)
+
+
+def light_groups(scene: Scene, lights: tuple[Light, ...], *, together: bool) -> tuple[LightGroup, ...]:
+    """Return the groups of some lights of a scene: all together, or one by one."""
+    several = [lights] if together else [(light,) for light in lights]
+    return tuple(LightGroup(replace(scene, lights=own)) for own in several)
 
 
 def _check_clouds(scene: Scene, method: Method) -> None:
@@ -232,59 +237,9 @@ def _check_clouds(scene: Scene, method: Method) -> None:
         )
 
 
-def _structure(lights: tuple[Light, ...]) -> tuple[tuple[bool, ...], ...]:
-    """Return the structure of lights: lights of one structure share recorded functions."""
-    return tuple(tuple(value is None for value in vars(light).values()) for light in lights)
-
-
-def _lights_by_group(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
-    """Return the lights of a scene by groups."""
-    scene = renderer.scene
-    if renderer.method.at_once or renderer.extra_layers:
-        return [scene.lights + renderer.samples]
-    return _few_together(renderer)
-
-
-def _few_together(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
-    """Return a few lights without extent together, more of them and light samples one by one."""
-    scene = renderer.scene
-    groups = [scene.lights] if scene.lights else []
-    if len(scene.lights) > (1 if scene.medium.bounded_media else _FEW):
-        groups = [(light,) for light in scene.lights]
-    return groups + [(sample,) for sample in renderer.samples]
-
-
-def surface_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
-    """Return the groups of lights by which surfaces are shaded: few each where the method takes many at once."""
-    if not renderer.shades_apart:
-        return light_groups(renderer)
-    return tuple(
-        LightGroup(replace(renderer.scene, lights=lights), renderer.structures[_structure(lights)])
-        for lights in _few_lights(renderer)
-    )
-
-
-def _few_lights(renderer: FrameRenderer) -> list[tuple[Light, ...]]:
-    """Return the lights of a scene, few of one structure together: a call goes through the whole Mitsuba scene."""
-    most = 1 if renderer.scene.medium.bounded_media else _FEW
-    alike: dict[Any, list[Light]] = {}
-    for light in (light for lights in _few_together(renderer) for light in lights):
-        alike.setdefault(_structure((light,)), []).append(light)
-    return [tuple(own[first : first + most]) for own in alike.values() for first in range(0, len(own), most)]
-
-
-def light_groups(renderer: FrameRenderer) -> tuple[LightGroup, ...]:
-    """Return the groups of lights of the scene as it is now, each with its functions."""
-    return tuple(
-        LightGroup(replace(renderer.scene, lights=lights), renderer.structures[_structure(lights)])
-        for lights in _lights_by_group(renderer)
-    )
-
-
-def _stages(renderer: FrameRenderer, scene: Scene, *, alone: bool) -> Stages:
-    """Return the functions for the lights of a scene; `alone` if these are all lights of the frame."""
-    method, features, extra_layers = renderer.method, scene.features, renderer.extra_layers
-    method.check(scene)
+def _stages(scene: Scene, method: Method, *, extra_layers: bool) -> Stages:
+    """Return the recorded functions of a frame."""
+    features = scene.features
     surface, shade, shade_casts_rays = surface_stages(
         scene,
         provides_visibility=method.provides_visibility,
@@ -292,40 +247,42 @@ def _stages(renderer: FrameRenderer, scene: Scene, *, alone: bool) -> Stages:
         through_media=not method.renders_clouds,
     )
 
-    def run(geometry, pixel, camera, medium, lights, state, distance, by_light, kernel, last=None, noise=None):
-        shown = {"features": features, "scene": geometry, "medium": medium, "lights": lights}
-        view = camera_view(camera, pixel, distance, **shown)
+    def run(geometry, pixel, camera, medium, tables, state, distance, by_light, kernel, first, last=None, noise=None):
+        view = camera_view(camera, pixel, distance, features=features, scene=geometry, medium=medium, tables=tables)
         view = replace(view, carried=last, noise=noise, extra_layers=extra_layers)
         if method.provides_visibility:
             view = replace(view, surfaces=by_light)
         with refusals():
             layers = method.render(view, state, kernel)
-        return _composed(layers if extra_layers else replace(layers, extra=None), by_light, alone=alone)
+        return _composed(layers if extra_layers else replace(layers, extra=None), by_light, first=first)
 
-    frozen = method.frozen and (renderer.by_rays or scene.camera.width * scene.camera.height <= _LARGE)
-    render = Frozen(run) if frozen else run
-    return Stages(method.preparation(scene), surface, shade, render, shade_casts_rays)
+    large = scene.camera.width * scene.camera.height > _LARGE
+    frozen = method.frozen and (_by_rays(method) or not large)
+    return Stages(method.preparation(scene), surface, shade, Frozen(run) if frozen else run, shade_casts_rays)
 
 
-def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, alone: bool):
+def _by_rays(method: Method) -> bool:
+    return method.by_rays and not method.carries and method.history is None
+
+
+def _composed(layers: Layers, by_light: tuple[PerRay, ...], *, first: bool):
     """Return a frame from layers, by the formula of `realtime.methods.interface.method`.
 
     `layers`: of a method; `by_light`: the radiance of the surfaces by light where the layers have a visibility,
-    otherwise their sum alone; `alone`: whether there is no other group of lights. Returns `airlight`, `surface`:
-    in-scattered radiance, and that from behind it [W/(m^2 sr)]; None where that is the shaded surface as it is;
-    `beyond`: the background through the layers, which is no light's own; None where there is none, or it is in
-    `surface`; `extra`, `carried`: as the layers have them.
+    otherwise their sum alone, or nothing for a further group; `first`: whether this is the first group of lights, which
+    shows what is of no light. Returns `airlight`, `surface`: in-scattered radiance, and that from behind it
+    [W/(m^2 sr)]; None where that is nothing but the shaded surface; `extra`, `carried`: as the layers have them.
     """
-    surface, beyond = None, layers.background
+    parts = list(by_light)
     if layers.visibility is not None:
-        lit = zip(layers.visibility, by_light, strict=True)
-        surface = _sum(tuple(_lit(fraction, color) for fraction, color in lit))
-    if layers.transmittance is not None:
-        surface = layers.transmittance * (_sum(by_light) if surface is None else surface)
-        beyond = None if beyond is None else layers.transmittance * beyond
-    if alone and beyond is not None:
-        surface, beyond = (_sum(by_light) if surface is None else surface) + beyond, None
-    return layers.in_scattered, surface, beyond, layers.extra, layers.carried
+        parts = [_lit(fraction, color) for fraction, color in zip(layers.visibility, by_light, strict=True)]
+    if first and layers.background is not None:
+        parts.append(layers.background)
+    surface = _sum(tuple(parts)) if parts else None
+    if surface is not None and layers.transmittance is not None:
+        surface = layers.transmittance * surface
+    changed = len(parts) != len(by_light) or layers.visibility is not None or layers.transmittance is not None
+    return layers.in_scattered, surface if changed else None, layers.extra, layers.carried
 
 
 def _sum(colors: tuple[PerRay, ...]) -> PerRay:
@@ -342,8 +299,8 @@ def render_frame(renderer: FrameRenderer) -> Frame:
     state, frame = renderer.prepare(renderer.scene), None
     for part in parts(renderer):
         cast, by_light = run_cast_and_shade(part)
-        if is_large(renderer) and len(renderer.structures) == 1:
-            cast = Cast(cast.distance)  # the method reads no more
+        if is_large(renderer) and not renderer.method.provides_visibility:
+            cast = Cast(cast.distance)  # nothing is shaded any more
         rendered = run_method(part, state, cast, by_light)
         stages, extra = evaluated(cast, rendered), rendered.extra
         del cast, by_light, rendered
@@ -393,45 +350,34 @@ def evaluated(cast: Cast, rendered: Rendered):
 
 def run_cast_and_shade(renderer: FrameRenderer) -> tuple[Cast, tuple[Any, ...]]:
     """Run the stage of camera rays and lit surface; return what the rays meet, and what `run_shade` returns for it."""
-    first, *others = surface_groups(renderer)
     scene = renderer.scene
-    shown = scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, first.lights
-    cast, by_light = first.stages.surface(*shown)
-    if renderer.shades_apart:
-        return cast, (_added(renderer, others, cast, by_light),)
-    kept = others[: kept_groups(by_light) - 1]
-    shaded = [_shaded(renderer, group, cast) for group in kept] + [None] * (len(others) - len(kept))
-    return cast, (by_light, *shaded)
+    shown = scene.geometry, scene.facets, renderer.pixel, scene.camera, scene.medium
+    cast, by_light = renderer.stages.surface(*shown, renderer.shaded[0])
+    return cast, _with_others(renderer, cast, by_light)
 
 
 def run_shade(renderer: FrameRenderer, cast: Cast) -> tuple[Any, ...]:
     """Run the stage of the lit surface on what was cast for an earlier frame, by groups of lights.
 
-    It is None for those that are not kept.
+    It is None for those that are not kept, and empty for those whose light the first one has.
     """
-    groups = surface_groups(renderer)
-    if renderer.shades_apart:
-        return (_added(renderer, groups[1:], cast, _shaded(renderer, groups[0], cast)),)
-    by_light = _shaded(renderer, groups[0], cast)
-    kept = kept_groups(by_light)
-    others = (_shaded(renderer, group, cast) if k < kept else None for k, group in enumerate(groups[1:], 1))
-    return (by_light, *others)
+    return _with_others(renderer, cast, _shaded(renderer, renderer.shaded[0], cast))
 
 
-def _added(renderer: FrameRenderer, groups: Sequence[LightGroup], cast: Cast, by_light: tuple[PerRay, ...]):
-    """Return the light of surfaces with that of further groups."""
-    total = _sum(by_light)
-    for group in groups:
-        total = total + _sum(_shaded(renderer, group, cast))
-        dr.eval(total)
-    return (total,)
+def _with_others(renderer: FrameRenderer, cast: Cast, by_light: tuple[PerRay, ...]) -> tuple[Any, ...]:
+    """Return surfaces by groups of lights; `by_light` are those of the first."""
+    if not renderer.method.provides_visibility:
+        return (by_light, *[()] * (len(renderer.groups) - 1))
+    kept, others = kept_groups(by_light), renderer.shaded[1:]
+    shaded = (_shaded(renderer, tables, cast) if k < kept else None for k, tables in enumerate(others, 1))
+    return (by_light, *shaded)
 
 
-def _shaded(renderer: FrameRenderer, group: LightGroup, cast: Cast):
-    """Return the surfaces that camera rays met in the light of a group."""
-    scene, stages = renderer.scene, group.stages
+def _shaded(renderer: FrameRenderer, tables: tuple[LightTable, ...], cast: Cast):
+    """Return the surfaces that camera rays met in the light of some tables."""
+    scene, stages = renderer.scene, renderer.stages
     geometry = scene.geometry if stages.shade_casts_rays else None
-    return stages.shade(geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, group.lights, cast)
+    return stages.shade(geometry, scene.facets, renderer.pixel, scene.camera, scene.medium, tables, cast)
 
 
 def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: Any = None) -> Rendered:
@@ -440,7 +386,7 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
     `renderer`, `state`: the frame, and what its `prepare` returned; `cast`, `by_light`: from `run_cast_and_shade`;
     `carried`: what the method handed on from the last frame; None for the first.
     """
-    groups, sums, scales = light_groups(renderer), None, dict[int | None, Any]()
+    groups, sums, scales = renderer.groups, None, dict[int | None, Any]()
     past = None
     if renderer.history is not None and carried is not None:
         carried, past = carried
@@ -448,18 +394,18 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
     if renderer.method.noisy:
         noise = Noise(dr.opaque(mi.UInt32, renderer.run), dr.opaque(mi.UInt32, renderer.frame), renderer.mask)
     if renderer.sphere_scales is not None:
-        scales = _sphere_scales(renderer, groups, cast)
+        scales = _sphere_scales(renderer, cast)
     for number, group in enumerate(groups):
-        shaded = by_light[number] if by_light[number] is not None else _shaded(renderer, group, cast)
-        own = state[number] if state[number] is not None else group.stages.prepare(group.scene)
-        rendered, beyond = _run_group(renderer, group, own, cast, shaded, last=carried, noise=noise)
-        if (scale := scales.get(group.scene.lights[0].source)) is not None:
+        shaded = by_light[number] if by_light[number] is not None else _shaded(renderer, group.tables, cast)
+        own = state[number] if state[number] is not None else renderer.stages.prepare(group.scene)
+        rendered = _run_group(renderer, group, own, cast, shaded, first=number == 0, last=carried, noise=noise)
+        if (scale := scales.get(group.scene.lights[0].source if group.scene.lights else None)) is not None:
             rendered = replace(rendered, airlight=rendered.airlight * scale)
         if sums is None:
-            surface = rendered.surface if beyond is None else rendered.surface + beyond
-            sums = replace(rendered, surface=surface)
+            sums = rendered
         else:
-            airlight, surface = sums.airlight + rendered.airlight, sums.surface + rendered.surface
+            airlight = sums.airlight + rendered.airlight
+            surface = sums.surface if rendered.surface is None else sums.surface + rendered.surface
             sums = replace(sums, airlight=airlight, surface=surface)
         if len(groups) > 1:
             dr.eval(sums.airlight, sums.surface)
@@ -470,14 +416,14 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
     return replace(sums, airlight=airlight, carried=(sums.carried, past))
 
 
-def _sphere_scales(renderer: FrameRenderer, groups: tuple[LightGroup, ...], cast: Cast) -> dict[int | None, Any]:
+def _sphere_scales(renderer: FrameRenderer, cast: Cast) -> dict[int | None, Any]:
     """Return by what the airlight of samples is scaled, by the number of their sphere light."""
     scene, scales = renderer.scene, dict[int | None, Any]()
     assert renderer.sphere_scales is not None
     for number, light in enumerate(scene.area_lights):
         if light.kind == "sphere":
             sphere = sampled_sphere(light, renderer.light_samples, type(scene.camera.origin.x))
-            like = next(group.lights[0] for group in groups if group.scene.lights[0].source == number)
+            like = next(sample for sample in renderer.lights if sample.source == number)
             shown = scene.camera, renderer.pixel, scene.medium, like, sphere, cast.distance, renderer.kernel
             scales[number] = renderer.sphere_scales(*shown)
             dr.eval(scales[number])
@@ -485,15 +431,17 @@ def _sphere_scales(renderer: FrameRenderer, groups: tuple[LightGroup, ...], cast
 
 
 def _run_group(
-    renderer: FrameRenderer, group: LightGroup, state, cast: Cast, by_light, *, last, noise
-) -> tuple[Rendered, PerRay | None]:
-    """Run the method for one group of lights; return what is seen behind all media, of no light, too."""
+    renderer: FrameRenderer, group: LightGroup, state, cast: Cast, by_light, *, first: bool, last, noise
+) -> Rendered:
+    """Run the method for one group of lights."""
     scene, method = renderer.scene, renderer.method
     geometry = scene.geometry if method.casts_rays else None
-    shown = geometry, renderer.pixel, scene.camera, scene.medium, group.lights, state, cast.distance, by_light
+    shown = geometry, renderer.pixel, scene.camera, scene.medium, group.tables, state, cast.distance, by_light
     more = (last, noise) if method.noisy else (last,) if method.carries else ()
-    airlight, surface, beyond, extra, carried = group.stages.render(*shown, renderer.kernel, *more)
-    return Rendered(airlight, _sum(by_light) if surface is None else surface, extra, carried), beyond
+    airlight, surface, extra, carried = renderer.stages.render(*shown, renderer.kernel, first, *more)
+    if surface is None and by_light:
+        surface = _sum(by_light)
+    return Rendered(airlight, surface, extra, carried)
 
 
 def kept_groups(state: Any) -> int:

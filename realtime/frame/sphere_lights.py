@@ -59,7 +59,7 @@ def sphere_scales(scene: Scene, method: Method) -> Frozen | None:
     features = scene.features
 
     def scale(camera, pixel, medium, light, sphere, distance, kernel):
-        view = camera_view(camera, pixel, distance, features=features, scene=None, medium=medium, lights=(light,))
+        view = camera_view(camera, pixel, distance, features=features, scene=None, medium=medium, tables=())
         Float = type(distance)
 
         def integral(normal, exact_normal):

@@ -14,8 +14,9 @@ recorded functions: one casts and shades, and hands on its hits at no cost; the 
 Casting and shading in two steps whenever something moved would take up to 7 % longer.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import drjit as dr
@@ -25,7 +26,9 @@ from airlight.realtime.numerics.array_types import Metres, PerRay
 from airlight.realtime.numerics.recorded import Frozen
 from airlight.realtime.rays import profile
 from airlight.realtime.scene.camera import ray_directions
-from airlight.realtime.scene.lights import Light, sources_of
+from airlight.realtime.scene.light_table import LightTable, one_by_one
+from airlight.realtime.scene.light_table import by_source as sources
+from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Medium, Rays
 from airlight.realtime.scene.read_scene import Scene
 from airlight.realtime.scene.triangle_table import Facets, facet_at, facet_number
@@ -136,53 +139,56 @@ def surface_stages(
     `scene`: the scene; what matters is what cannot move; `provides_visibility`: whether the method finds out which
     surfaces are lit; `by_source`: whether it does so for all points of an area light together; `through_media`:
     whether the bounded media dim the surfaces; if not, the method says how much they do. Returns `surface`: (geometry,
-    facets, pixel, camera, medium, lights) -> what camera rays meet, and what `shade` returns; `shade`: (geometry,
-    facets, pixel, camera, medium, lights, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:
+    facets, pixel, camera, medium, tables) -> what camera rays meet, and what `shade` returns; `shade`: (geometry,
+    facets, pixel, camera, medium, tables, cast) -> surface radiance by light, or a tuple of their sum; `casts_rays`:
     whether `shade` needs the geometry.
     """
-    sources = sources_of(scene.lights)
+
+    def apart(tables: Sequence[LightTable]) -> list[LightTable]:
+        return list(sources(tables)) if by_source else [light for table in tables for light in one_by_one(table)]
+
     if not scene.features.surfaces:
-        return *_no_surfaces(len(sources) if by_source else len(scene.lights) if provides_visibility else 1), False
-    # The map of a light at infinity covers the media alone; surfaces beside them are lit too.
-    asked = [not (light.w and provides_visibility) for light in scene.lights]
+        return *_no_surfaces(lambda tables: len(apart(tables)) if provides_visibility else 1), False
 
     def cast_all(geometry, facets, pixel, camera, medium) -> Cast:
         direction, _ = ray_directions(camera, pixel)
         cast = cast_rays(geometry, facets, camera.origin, direction)
         return replace(cast, crossed=medium.rays(camera.origin, direction).crossed if through_media else ())
 
-    def shade_all(geometry, facets, pixel, camera, medium, lights, cast):
+    def shade_all(geometry, facets, pixel, camera, medium, tables, cast):
         direction, _ = ray_directions(camera, pixel)
         seen = visible_surface(cast, facets, camera.origin, direction, color=type(medium.albedo))
         medium = medium if through_media else replace(medium, bounded_media=())
         rays = Rays(camera.origin, direction, direction, cast.crossed)
         depths = medium.optical_depth(rays, 0, dr.select(seen.seen, cast.distance, 0))
-        shown = {"medium": medium, "depths": depths}
 
-        def lit(number: int):
-            return lit_surface(geometry, seen, light=lights[number], shadows=asked[number], **shown)
+        def lit(light: Light, number: Any = 0):
+            # The map of a light at infinity covers the media alone; surfaces beside them are lit too.
+            shadows = not (light.w and provides_visibility)
+            return lit_surface(geometry, seen, medium=medium, light=light, depths=depths, shadows=shadows)
 
-        if provides_visibility and not by_source:
-            return tuple(lit(number) for number in range(len(lights)))
-        colors = tuple(sum(map(lit, source)) for source in sources)
-        return colors if by_source else (sum(colors),)
+        nothing = dr.zeros(type(medium.albedo), dr.width(pixel))
+        if not provides_visibility:
+            return (reduce(lambda total, table: table.sum(lit, total), tables, nothing),)
+        return tuple(part.sum(lit, nothing) for part in apart(tables))
 
     @Frozen
-    def surface(geometry, facets, pixel, camera, medium, lights):
+    def surface(geometry, facets, pixel, camera, medium, tables):
         cast = cast_all(geometry, facets, pixel, camera, medium)
-        return cast, shade_all(geometry, facets, pixel, camera, medium, lights, cast)
+        return cast, shade_all(geometry, facets, pixel, camera, medium, tables, cast)
 
-    return surface, Frozen(shade_all), scene.facets is None or any(asked)
+    asks = not provides_visibility or any(not light.w for light in scene.lights)
+    return surface, Frozen(shade_all), scene.facets is None or asks
 
 
-def _no_surfaces(colors: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return the stages of a scene without surfaces, whose `shade` returns that many black colours."""
+def _no_surfaces(colors: Callable[[Sequence[LightTable]], int]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return the stages of a scene without surfaces, whose `shade` returns so many black colours."""
 
-    def shade(geometry, facets, pixel, camera, medium, lights, cast):
-        return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in range(colors))
+    def shade(geometry, facets, pixel, camera, medium, tables, cast):
+        return tuple(dr.zeros(type(medium.albedo), dr.width(pixel)) for _ in range(colors(tables)))
 
-    def surface(geometry, facets, pixel, camera, medium, lights):
+    def surface(geometry, facets, pixel, camera, medium, tables):
         cast = Cast(dr.full(type(camera.origin.x), dr.inf, dr.width(pixel)))
-        return cast, shade(geometry, facets, pixel, camera, medium, lights, cast)
+        return cast, shade(geometry, facets, pixel, camera, medium, tables, cast)
 
     return surface, shade

@@ -86,6 +86,7 @@ class CloudCollectors(Method):
     summary = "clouds: light of all orders from where it enters them, found by light maps and the transport of a slab"
     source = "Bouthors, Neyret, Max, Bruneton, Crassin 2008"
     renders_clouds = True
+    at_once = True
     prepared_from = frozenset({"geometry", "light"})
     casts_rays = True
     provides_visibility = True
@@ -132,11 +133,6 @@ class CloudCollectors(Method):
     def carries(self):
         """Frames hand their collectors on."""
         return self.start == "previous"
-
-    @property
-    def at_once(self):
-        """Collectors are handed on for all suns together."""
-        return self.carries
 
     def preparation(self, scene):
         """Return a function that makes the light maps of a frame; grids and boundaries are made here, once.

@@ -70,6 +70,7 @@ class CloudOctaves(Method):
     summary = "clouds: single scattering with less extinction in every octave, as in game engines"
     source = "Wrenninge 2013; Hillaire 2016"
     renders_clouds = True
+    at_once = True
     prepared_from = frozenset({"geometry", "light"})
     casts_rays = True
     provides_visibility = True

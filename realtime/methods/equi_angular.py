@@ -29,7 +29,7 @@ from airlight.realtime.methods.interface.method import Layers, Method, View, ani
 from airlight.realtime.numerics.functions import summed
 from airlight.realtime.numerics.noise import PATTERNS
 from airlight.realtime.parameters import parameter
-from airlight.realtime.scene.light_samples import light_tables
+from airlight.realtime.scene.light_table import light_choice, light_tables
 from airlight.realtime.scene.lights import Light
 
 _STEP = 0.7548776662466927  # 1/g with g^3 = g + 1
@@ -59,24 +59,23 @@ class EquiAngular(Method):
     animate: str = animate()
 
     def preparation(self, scene):
-        """Return a function that makes tables of the lights."""
-        return lambda now: light_tables(now.lights)
+        """Return a function of what draws the lights of each table that have a place."""
+        return lambda now: tuple(light_choice(table) if table.rows.w else None for table in light_tables(now.lights))
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by chance [W/(m^2 sr)]."""
         golden = self.animate == "golden"
         place, choice = (view.pattern(self.jitter, golden=golden, stream=stream) for stream in (0, 1))
         total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
-        for light in view.lights:
-            if not light.w:
-                total += self._mean(lambda at, _, light=light: _sample(view, light, at), place, choice, total)
-        for table in state:
+        for table, by_power in zip(view.tables, state, strict=True):
 
-            def picked(at: Any, fraction: Any, table: Any = table) -> Any:
-                number, probability = table.pick(fraction)
-                return _sample(view, table.light(number, view.lights[table.first]), at) / probability
+            def sample(at: Any, fraction: Any, table: Any = table, by_power: Any = by_power) -> Any:
+                if by_power is None:  # a light at infinity is a table by itself
+                    return _sample(view, table.rows, at)
+                number, probability = by_power.pick(fraction)
+                return _sample(view, table[number], at) / probability
 
-            total += self._mean(picked, place, choice, total)
+            total += self._mean(sample, place, choice, total)
         return Layers(total)
 
     def _mean(self, sample: Any, place: Any, choice: Any, like: Any) -> Any:

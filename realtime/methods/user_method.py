@@ -31,7 +31,8 @@ import numpy as np
 from airlight.realtime.errors import InputError, root_of
 from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.parameters import values
-from airlight.realtime.scene.lights import sources_of
+from airlight.realtime.scene.light_table import by_source as sources
+from airlight.realtime.scene.light_table import one_by_one
 
 _WANTED = "expected 'module:function' or 'path/to/file.py:function'"
 _TYPES = (bool, int, float, str)
@@ -378,7 +379,8 @@ def checked_layers(returned: Any, view: View, name: str, *, visibility: bool, by
             f"method {name}: returned a {type(returned).__name__}; expected realtime.methods.interface.method.Layers"
         )
     fractions = 0 if returned.visibility is None else len(returned.visibility)
-    wanted = len(sources_of(view.lights) if by_source else view.lights) if visibility else 0
+    several = sources(view.tables) if by_source else (light for table in view.tables for light in one_by_one(table))
+    wanted = len(list(several)) if visibility else 0
     if fractions != wanted or (returned.visibility is None) == visibility:
         raise InputError(
             f"method {name}: returned the visibility of {fractions} lights, expected that of {wanted}: one for each "

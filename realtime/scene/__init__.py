@@ -16,6 +16,6 @@ Read in this order:
 - `mesh_adjacency.py`: triangles that cast shadows, and their neighbours;
 - `read_media.py`: reads the media of a Mitsuba scene;
 - `read_scene.py`: reads a Mitsuba scene, and says what it needs of a method;
-- `light_samples.py`: area lights as light samples, and lights of one structure as a table;
+- `light_table.py`: lights of one structure as a table, and area lights as light samples;
 - `animate.py`: the scene after lights, the medium or objects moved.
 """

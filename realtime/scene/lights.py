@@ -153,15 +153,6 @@ class Light:
         return Light(self.position, self.intensity)
 
 
-def sources_of(lights: tuple[Light, ...]) -> list[list[int]]:
-    """Return the numbers of the lights of each source: those of an area light together, others alone."""
-    by_source: dict[Any, list[int]] = {}
-    for number, light in enumerate(lights):
-        key = ("alone", number) if light.source is None else light.source
-        by_source.setdefault(key, []).append(number)
-    return list(by_source.values())
-
-
 def host_position(light: Light) -> Array:
     """Return the homogeneous position of a light on the host: l [m for w = 1] and w, (4,), in float64."""
     if light.w:

@@ -26,7 +26,7 @@ import drjit as dr
 import mitsuba as mi
 
 from airlight.realtime.numerics.array_types import bytes_of
-from airlight.realtime.scene.light_samples import LightTable
+from airlight.realtime.scene.light_table import LightTable
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Rays
 from airlight.realtime.shadow_maps.shadow_map import check_size, tiled_corners
@@ -106,23 +106,21 @@ def maps_memory(Float: Any, points: int, size: int) -> int:
     return 2 * bytes_of(Float) * points * (size + 1) ** 2
 
 
-def cast_hemisphere_maps(
-    scene: Any, table: LightTable, like: Light, size: int, *, for_surfaces: bool = True
-) -> HemisphereMaps:
+def cast_hemisphere_maps(scene: Any, table: LightTable, size: int, *, for_surfaces: bool = True) -> HemisphereMaps:
     """Cast the maps of light samples.
 
-    `scene`: the Mitsuba scene that holds the occluders; `table`, `like`: the light samples, and one of them; `size`:
+    `scene`: the Mitsuba scene that holds the occluders; `table`: the light samples; `size`:
     texels on a side of each map, a power of two; `for_surfaces`: whether points on surfaces will be asked for, not only
     those in the air. Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
-    Float, side, points = type(like.position.x), size + 1, table.count
+    Float, side, points = type(table.rows.position.x), size + 1, table.count
     number, row, column = tiled_corners(points, side)
     there = (row < side) & (column < side)
     u, v = (dr.fma(Float(corner), 2.0 / size, -1.0) for corner in (column, row))
     a, b = 0.5 * (u + v), 0.5 * (u - v)
     c = dr.maximum(1 - dr.abs(a) - dr.abs(b), 0)
-    light = table.light(number, like)
+    light = table[number]
     assert light.facing is not None
     across, up = _across(light)
     aim = across * a + up * b + light.normal * c

@@ -24,6 +24,7 @@ from airlight.realtime.errors import InputError
 from airlight.realtime.memory import check_memory
 from airlight.realtime.numerics.array_types import bytes_of
 from airlight.realtime.parameters import parameter
+from airlight.realtime.scene.light_table import LightTable
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.projection import (
     Projection,
@@ -39,13 +40,30 @@ class ShadowMap:
     """Distances from a light to the nearest surface, face by face, row by row."""
 
     size: int  #: texels on a side
-    distance: Any  #: faces (size + 1)^2 values along the rays [m]
+    distance: Any  #: faces (size + 1)^2 values along the rays, from `first` on [m]
     projection: Projection
+    first: Any = 0
 
     @property
     def faces(self) -> int:
         """How many faces the map has."""
         return self.projection.faces
+
+
+@dataclass(frozen=True)
+class ShadowMaps:
+    """The shadow maps of the lights of a table, one after another."""
+
+    size: int  #: texels on a side
+    distance: Any  #: of `ShadowMap`
+    projection: Projection | None  #: of a single light; those of several follow from the lights
+
+    def of(self, number: Any, light: Light) -> ShadowMap:
+        """Return the maps of lights of some numbers."""
+        if self.projection is not None:
+            return ShadowMap(self.size, self.distance, self.projection)
+        first = number * (light_faces(light) * (self.size + 1) ** 2)
+        return ShadowMap(self.size, self.distance, light_projection(light), first)
 
 
 def check_size(size) -> None:
@@ -75,24 +93,30 @@ def check_maps(lights: Sequence[Light], size: int, needed: int | None = None) ->
 
 
 def cast_shadow_map(scene, light: Light, size: int) -> ShadowMap:
-    """Cast the shadow map of one light.
+    """Cast the shadow map of one light; see `cast_shadow_maps`."""
+    return cast_shadow_maps(scene, LightTable(light, 1), size).of(0, light)
 
-    `scene`: the Mitsuba scene that holds the occluders; `light`: the light; `size`: texels on a side, a power of two.
+
+def cast_shadow_maps(scene, table: LightTable, size: int) -> ShadowMaps:
+    """Cast the shadow maps of all lights of a table at once.
+
+    `scene`: the Mitsuba scene that holds the occluders; `table`: the lights; `size`: texels on a side, a power of two.
     Raises InputError if `size` is not a power of two from 4 to 8192.
     """
     check_size(size)
     Double = mi.Float64
-    projection = light_projection(light)
-    side, faces = size + 1, projection.faces
-    face, row, column = tiled_corners(faces, side)
+    side, faces = size + 1, light_faces(table.rows)
+    face, row, column = tiled_corners(table.count * faces, side)
     there = (row < side) & (column < side)
+    number = face // faces
     # Whole numbers and powers of two: exact, so that neighbouring faces cast the same rays along their common edge.
     u, v = (dr.fma(Double(corner), 2.0 / size, -1.0) for corner in (column, row))
-    cast = cast_map_rays(scene, light, (face, u, v), there)
-    distance = dr.empty(type(cast), faces * side * side)
+    cast = cast_map_rays(scene, table[number], (face - number * faces, u, v), there)
+    distance = dr.empty(type(cast), table.count * faces * side * side)
     dr.scatter(distance, cast, (face * side + row) * side + column, there)
+    projection = light_projection(table.rows) if table.count == 1 else None
     dr.eval(distance, projection)  # Evaluate it once: every kernel that reads it would cast the rays again.
-    return ShadowMap(size, distance, projection)
+    return ShadowMaps(size, distance, projection)
 
 
 def inverse_depth(shadow_map: ShadowMap):
@@ -158,7 +182,8 @@ def lit_in_map(shadow_map: ShadowMap, light: Light, point):
         u, v = (a / c, b / c) if projection.w else (a, b)
     size = shadow_map.size
     column, row = (_nearest(dr.fma(place, 0.5 * size, 0.5 * (size + 1)), size) for place in (u, v))
-    stored = dr.gather(Float, shadow_map.distance, (face * (size + 1) + row) * (size + 1) + column)
+    texel = shadow_map.first + (face * (size + 1) + row) * (size + 1) + column
+    stored = dr.gather(Float, shadow_map.distance, texel)
     if projection.w:
         return dr.squared_norm(d) <= dr.square(stored)
     return projection.products(face, d)[2] <= stored - projection.depth

@@ -17,7 +17,7 @@ import drjit as dr
 from airlight.analytic.clock import stopwatch
 from airlight.errors import InputError
 from airlight.realtime.frame.incremental import FrameCache, next_frame
-from airlight.realtime.frame.renderer import Frame, FrameRenderer, Stages, image_frame
+from airlight.realtime.frame.renderer import Frame, FrameRenderer, image_frame
 from airlight.realtime.methods.registry import find_method
 from airlight.realtime.methods.shader.method import Shader
 from airlight.realtime.parameters import defaults
@@ -40,11 +40,8 @@ def timed_stages(renderer: FrameRenderer) -> tuple[FrameRenderer, dict[str, floa
     """Return a renderer that does the same, and a dictionary that its next frame fills with the time of stages [ms]."""
     times: dict[str, float] = {}
 
-    def clocked(stages: Stages) -> Stages:
-        timed: dict[str, Any] = {name: _clocked(name, getattr(stages, name), times) for name in WORDS}
-        return replace(stages, **timed)
-
-    return replace(renderer, structures={key: clocked(stages) for key, stages in renderer.structures.items()}), times
+    timed: dict[str, Any] = {name: _clocked(name, getattr(renderer.stages, name), times) for name in WORDS}
+    return replace(renderer, stages=replace(renderer.stages, **timed)), times
 
 
 def _clocked(name: str, stage: Callable[..., Any], times: dict[str, float]) -> Callable[..., Any]:
@@ -218,7 +215,7 @@ class LiveScene:
         key = self.chosen, self._code()
         if key not in self._renderers:
             made = prepared(self.scene, self.chosen)
-            self._renderers[key] = self._with_known_surface(made) if len(made.structures) == 1 else made
+            self._renderers[key] = self._with_known_surface(made)
             while len(self._renderers) > _KEPT:
                 self._renderers.popitem(last=False)
         self._renderers.move_to_end(key)
@@ -228,9 +225,6 @@ class LiveScene:
         """Return a renderer that casts and shades by the functions that another one has recorded."""
         key = self._code(), made.method.provides_visibility, made.method.by_source
         known = self._surfaces.setdefault(key, made)
-        structures = {
-            lights: replace(stages, surface=known.stages.surface, shade=known.stages.shade)
-            for lights, stages in made.structures.items()
-        }
+        stages = replace(made.stages, surface=known.stages.surface, shade=known.stages.shade)
         # The pixels too: a recorded function tells arrays apart by how they lie in memory.
-        return replace(made, pixel=known.pixel, structures=structures)
+        return replace(made, pixel=known.pixel, stages=stages)

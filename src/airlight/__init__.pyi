@@ -13,7 +13,8 @@ from .realtime.methods.interface.method import Method as Method
 from .realtime.methods.registry import METHODS as METHODS
 from .realtime.methods.registry import find_method as find_method
 from .realtime.parameters import parameter as parameter
-from .realtime.scene.light_samples import light_tables as light_tables
+from .realtime.scene.light_table import light_choice as light_choice
+from .realtime.scene.light_table import light_tables as light_tables
 from .realtime.scene.read_scene import read_scene as read_scene
 from .reference.storage.exr import read_exr as read_exr
 from .reference.storage.exr import write_exr as write_exr

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airlight.realtime.methods.soft_shafts.sources import source_state
-from airlight.realtime.scene.light_samples import light_samples
+from airlight.realtime.scene.light_table import light_samples, light_tables
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, lit_in_map
 from tests.helpers.lamps import lamp_scene
@@ -28,10 +28,10 @@ def test_a_look_up_stays_in_the_map_whatever_the_point(variant, kind):
 
 def test_a_plane_never_shadows_itself(variant):
     scene = read_scene(mi.load_dict(lamp_scene(ball=None)))
-    lights = light_samples(scene, 3, "ring")
-    state = source_state(scene.geometry, list(lights), 64, with_maps=True)
+    (lights,) = light_tables(light_samples(scene, 3, "ring"))
+    state = source_state(scene.geometry, lights, 64, with_maps=True)
     points = np.random.default_rng(4).uniform([-5, -5, 0], [5, 5, 0], (50000, 3))
     place = mi.Vector3f(*(mi.Float(column) for column in points.T))
-    light = state.samples.light(mi.UInt32(1), lights[0])
+    light = lights[mi.UInt32(1)]
     before = np.array(dr.dot(place - light.position, light.normal)) > 0.1
     assert np.all(np.array(state.maps.of(mi.UInt32(1), light).lit_surface(place))[before])

@@ -26,7 +26,6 @@ from airlight.errors import InputError
 from airlight.realtime.frame.renderer import (
     Frame,
     FrameRenderer,
-    light_groups,
     render_frame,
     run_stages,
     unchecked_frame,
@@ -270,7 +269,7 @@ def _too_long(renderer: FrameRenderer, cell: Cell, took: float) -> str | None:
     the renderer `took` so little [s] that a frame is far below the limit.
     """
     chosen, limit = cell.chosen, cell.measure.limit
-    many = len(light_groups(renderer)) > 1
+    many = len(renderer.groups) > 1
     if limit is None or not (chosen.own or many or took > _DOUBTFUL * limit):
         return None
     if many:

@@ -48,7 +48,6 @@ from airlight.realtime.methods.interface.method import View
 from airlight.realtime.numerics.array_types import Metres, PerRay, four_numbers
 from airlight.realtime.numerics.functions import between_entries
 from airlight.realtime.scene.camera import Camera, row_and_column
-from airlight.realtime.scene.light_samples import LightTable
 from airlight.realtime.scene.media.medium import Medium, Rays
 
 _RATIO = 8  # far/near
@@ -95,12 +94,9 @@ class Grid:
         return 0.5 - across / camera.width, 0.5 - upward / camera.height, depth
 
 
-def view_grid(view: View, samples: LightTable | None, *, size: tuple[int, int, int], far: float) -> Grid:
-    """Return the grid of a view: froxels across, down and in depth, up to a depth [m]; 0: chosen for the frame.
-
-    `samples`: those of area lights.
-    """
-    return Grid(*size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view, samples))
+def view_grid(view: View, *, size: tuple[int, int, int], far: float) -> Grid:
+    """Return the grid of a view: froxels across, down and in depth, up to a depth [m]; 0: chosen for the frame."""
+    return Grid(*size, view.camera, dr.opaque(type(view.distance), far) if far else _frame_depth(view))
 
 
 def column_rays(view: View, grid: Grid) -> Rays:
@@ -111,7 +107,7 @@ def column_rays(view: View, grid: Grid) -> Rays:
     return rays
 
 
-def _frame_depth(view: View, samples: LightTable | None) -> Metres:
+def _frame_depth(view: View) -> Metres:
     """Return the depth of the farthest surface, or where rays meet none, where too little light comes from to matter.
 
     Grids, and media in vacuum, end by themselves.
@@ -124,12 +120,9 @@ def _frame_depth(view: View, samples: LightTable | None) -> Metres:
     if last is not None:
         return dr.maximum(dr.select(dr.all(met), dr.minimum(surfaces, last), last), 1e-3)
     beyond = Float(0)
-    for light in view.lights:
-        if light.facing is None:
-            beyond = dr.maximum(beyond, _reach(view, light.position, medium))
-    if samples is not None:
-        every = samples.light(dr.arange(mi.UInt32, samples.count), view.lights[-1])
-        beyond = dr.maximum(beyond, dr.max(_reach(view, every.position, medium)))
+    for table in view.tables:
+        reach = _reach(view, table[dr.arange(mi.UInt32, table.count)].position, medium)
+        beyond = dr.maximum(beyond, reach if table.count == 1 else dr.max(reach))
     return dr.maximum(dr.select(dr.all(met), surfaces, dr.maximum(surfaces, beyond)), 1e-3)
 
 

@@ -34,14 +34,12 @@ import mitsuba as mi
 from airlight.realtime.methods.froxel_fog.grid import Grid
 from airlight.realtime.methods.interface.method import View
 from airlight.realtime.numerics.array_types import PerRay
-from airlight.realtime.numerics.functions import summed
 from airlight.realtime.rays import profile
-from airlight.realtime.scene.light_samples import LightTable
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import Rays
 
-#: (point, light, its number among lights without extent, or among light samples) -> whether it is lit.
-Visibility = Callable[[Any, Light, Any], Any]
+#: (point, number of a table) -> function (light, its number in the table) -> whether it reaches the point.
+Visibility = Callable[[Any, int], Callable[[Light, Any], Any]]
 
 _GROWTH = 1.2207440846057596  # g^4 = g + 1
 _STEPS = tuple(round(2**32 / _GROWTH**power) % 2**32 for power in (1, 2, 3))
@@ -74,27 +72,24 @@ def scattered_light(
     rays: Rays,
     *,
     shift: tuple[Any, Any, Any],
-    samples: LightTable | None,
     visible: Visibility,
 ) -> PerRay:
     """Return the light that each froxel scatters to the camera, a colour [W/(m^3 sr)].
 
     `view`, `grid`, `rays`: the frame, its froxels, and the middle rays of columns; `shift`: of the points from the
-    middles of the froxels, in parts of a froxel across, down and in depth; `samples`: those of all area lights, summed
-    in one loop; `visible`: which light reaches which point.
+    middles of the froxels, in parts of a froxel across, down and in depth; `visible`: which light reaches which point.
     """
     points = _froxel_points(view, grid, rays, shift)
     total = dr.zeros(type(view.medium.albedo), grid.columns * grid.slices)
 
-    def scattered(light: Light, number: Any) -> Any:
-        lit = visible(points.point, light, number) if view.features.shadows else True
-        return light.intensity * _weight(view, light, points, lit)
+    for place, table in enumerate(view.tables):
+        reaches = visible(points.point, place)
 
-    for number, light in enumerate(light for light in view.lights if light.facing is None):
-        total += scattered(light, number)
-    if samples is not None:
-        like = next(light for light in view.lights if light.facing is not None)
-        total = summed(samples.count, lambda number: scattered(samples.light(number, like), number), total)
+        def scattered(light: Light, number: Any, reaches: Any = reaches) -> Any:
+            lit = reaches(light, number) if view.features.shadows else True
+            return light.intensity * _weight(view, light, points, lit)
+
+        total = table.sum(scattered, total)
     return view.medium.unit * total * (0.25 * dr.inv_pi)
 
 

@@ -17,15 +17,15 @@ import drjit as dr
 from airlight.realtime.memory import check_memory
 from airlight.realtime.methods.froxel_fog.grid import accumulated, airlight_at_pixels, column_rays, view_grid
 from airlight.realtime.methods.froxel_fog.injection import Visibility, frame_shift, scattered_light
-from airlight.realtime.methods.interface.method import Layers, Method, View
+from airlight.realtime.methods.interface.method import Layers, Method, View, no_state
 from airlight.realtime.numerics.array_types import bytes_of
 from airlight.realtime.parameters import parameter
-from airlight.realtime.scene.light_samples import LightTable, light_tables
+from airlight.realtime.scene.light_table import light_tables
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps, maps_memory
 from airlight.realtime.shadow_maps.shadow_map import (
-    ShadowMap,
-    cast_shadow_map,
+    ShadowMaps,
+    cast_shadow_maps,
     check_maps,
     lit_in_map,
     map_memory,
@@ -33,15 +33,6 @@ from airlight.realtime.shadow_maps.shadow_map import (
 )
 
 _NUMBERS = 12  # of a froxel: scattered light and airlight, four each, and as much on the way
-
-
-@dataclass(frozen=True)
-class FroxelLights:
-    """The light samples of a frame, and shadow maps; none where rays are cast."""
-
-    samples: LightTable | None  #: of all area lights
-    maps: tuple[ShadowMap, ...] = ()  #: of the lights without extent
-    sample_maps: HemisphereMaps | None = None
 
 
 @dataclass(frozen=True)
@@ -91,29 +82,24 @@ class FroxelFog(Method):
             check_maps(scene.lights, self.map, froxels + maps + maps_memory(Float, samples, self.point_map))
 
     def preparation(self, scene):
-        """Return a function that makes tables of light samples and, if asked for, shadow maps."""
-        with_maps = self.shadow == "map" and scene.features.shadows
+        """Return a function that casts the shadow maps of each table of lights, if they are asked for."""
+        if self.shadow != "map" or not scene.features.shadows:
+            return no_state
 
-        def prepare(now):
-            points = [light for light in now.lights if light.facing is not None]
-            samples = light_tables(points)[0] if points else None
-            if not with_maps:
-                return FroxelLights(samples)
-            maps = tuple(cast_shadow_map(now.geometry, light, self.map) for light in now.lights if light.facing is None)
-            if samples is None:
-                return FroxelLights(None, maps)
-            of_samples = cast_hemisphere_maps(now.geometry, samples, points[0], self.point_map, for_surfaces=False)
-            return FroxelLights(samples, maps, of_samples)
+        def maps(geometry, table):
+            if table.rows.facing is None:
+                return cast_shadow_maps(geometry, table, self.map)
+            return cast_hemisphere_maps(geometry, table, self.point_map, for_surfaces=False)
 
-        return prepare
+        return lambda now: tuple(maps(now.geometry, table) for table in light_tables(now.lights))
 
     def render(self, view, state, kernel):
         """Return the airlight of every ray by froxels [W/(m^2 sr)]."""
-        grid = view_grid(view, state.samples, size=self.grid_size, far=self.far)
+        grid = view_grid(view, size=self.grid_size, far=self.far)
         dr.eval(grid.far)
         shift = frame_shift(view) if self.noisy else (0, 0, 0)
         visible, rays = _visibility(view, state, self.shadow), column_rays(view, grid)
-        scattered = scattered_light(view, grid, rays, shift=shift, samples=state.samples, visible=visible)
+        scattered = scattered_light(view, grid, rays, shift=shift, visible=visible)
         dr.eval(scattered)
         return Layers(airlight_at_pixels(view, grid, accumulated(view, grid, rays, scattered)))
 
@@ -125,13 +111,16 @@ class FroxelFog(Method):
         return ("map", {"shadow": "ray"}), ("resolution", {"width": size[0], "height": size[1]}), ("steps", None)
 
 
-def _visibility(view: View, lights: FroxelLights, shadow: str) -> Visibility:
-    def visible(point, light: Light, number):
-        if shadow == "ray":
-            return view.visible(point, light)
-        if light.facing is None:
-            return lit_in_map(lights.maps[number], light, point)
-        assert lights.sample_maps is not None
-        return lights.sample_maps.of(number, light).lit(point)
+def _visibility(view: View, states: tuple[ShadowMaps | HemisphereMaps, ...], shadow: str) -> Visibility:
+    def visible(point, place):
+        def reaches(light: Light, number):
+            if shadow == "ray":
+                return view.visible(point, light)
+            maps = states[place]
+            if isinstance(maps, HemisphereMaps):
+                return maps.of(number, light).lit(point)
+            return lit_in_map(maps.of(number, light), light, point)
+
+        return reaches
 
     return visible

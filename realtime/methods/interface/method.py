@@ -28,6 +28,7 @@ from airlight.realtime.numerics.noise import PATTERNS, Noise
 from airlight.realtime.parameters import Parameters, defaults, parameter, read_parameters, values
 from airlight.realtime.rays import RayGeometry, ray_geometry
 from airlight.realtime.scene.camera import Camera, ray_directions, row_and_column
+from airlight.realtime.scene.light_table import LightTable
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.medium import LitRays, Medium, Rays
 from airlight.realtime.scene.read_scene import Scene, SceneFeatures
@@ -38,7 +39,7 @@ class View(Rays):
     """The rays of a frame and all that scatters light into them, as Dr.Jit arrays with one entry per pixel."""
 
     distance: Metres  #: to the visible surface, infinite where there is none [m]
-    lights: tuple[Light, ...]
+    tables: tuple[LightTable, ...]  #: the lights, a table for each structure and area light
     medium: Medium
     features: SceneFeatures  #: what the scene needs; a method leaves out the rest
     camera: Camera
@@ -49,6 +50,11 @@ class View(Rays):
     extra_layers: bool = False  #: whether the image is to have `Layers.extra`
     carried: Any = None  #: the `Layers.carried` of the last frame; None in the first
     noise: Noise | None = None  #: what draws random numbers; None for a method that does not say that it is `noisy`
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """The lights one by one, for code that does not loop over tables: a kernel then grows with them."""
+        return tuple(table[number] for table in self.tables for number in range(table.count))
 
     @property
     def run(self) -> Any:
@@ -140,12 +146,12 @@ class View(Rays):
 
 
 def camera_view(
-    camera: Camera, pixel: PerRay, distance: Metres, *, features: SceneFeatures, scene, medium: Medium, lights
+    camera: Camera, pixel: PerRay, distance: Metres, *, features: SceneFeatures, scene, medium: Medium, tables
 ) -> View:
     """Return the view of some pixels; `distance`: to the visible surface [m]."""
     rays = medium.rays(camera.origin, *ray_directions(camera, pixel))
     own = {"features": features, "camera": camera, "pixel": pixel, "scene": scene}
-    return View(**vars(rays), distance=distance, lights=tuple(lights), medium=medium, **own)
+    return View(**vars(rays), distance=distance, tables=tables, medium=medium, **own)
 
 
 #: Parts of a scene that may change between frames; `look` is all without motion: the medium and the lights' colours.

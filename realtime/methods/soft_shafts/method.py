@@ -59,8 +59,8 @@ from airlight.realtime.methods.soft_shafts.sources import (
     source_state,
 )
 from airlight.realtime.numerics.array_types import two_numbers
-from airlight.realtime.numerics.functions import summed
-from airlight.realtime.scene.lights import Light, sources_of
+from airlight.realtime.scene.light_table import LightTable, by_source, light_tables
+from airlight.realtime.scene.lights import Light
 from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, maps_memory
 from airlight.realtime.shadow_maps.shadow_map import check_maps, lit_in_map, map_memory
 
@@ -80,14 +80,14 @@ class SoftShafts(SoftShaftsParameters):
 
     def check(self, scene):
         """Refuse a `scale` that does not divide the image, more samples than share a tile, and maps without room."""
-        camera, sources = scene.camera, sources_of(scene.lights)
+        camera = scene.camera
         size, scale = self.map, self.scale
         if camera.width % scale or camera.height % scale:
             raise InputError(
                 f"scale: got {scale} and an image of {camera.width} x {camera.height}, expected one that divides both "
                 "sides"
             )
-        most = max(len(source) for source in sources)
+        most = max(lights.count for lights in by_source(light_tables(scene.lights)))
         if self.interleave and (most > 16 or 16 % most):
             raise InputError(
                 f"interleave: got {most} points of a light, expected 1, 2, 4, 8 or 16, of which a tile has each"
@@ -109,8 +109,8 @@ class SoftShafts(SoftShaftsParameters):
         }
 
         def prepare(now):
-            by_source = ([now.lights[number] for number in source] for source in sources_of(now.lights))
-            return tuple(source_state(now.geometry, lights, self.map, **asked) for lights in by_source)
+            sources = by_source(light_tables(now.lights))
+            return tuple(source_state(now.geometry, lights, self.map, **asked) for lights in sources)
 
         return prepare
 
@@ -118,9 +118,9 @@ class SoftShafts(SoftShaftsParameters):
         """Return the layers of every ray."""
         frame = _Frame(view, state, self)
         total, visibility = dr.zeros(type(view.medium.albedo), dr.width(view.pixel)), []
-        for number, source in enumerate(sources_of(view.lights)):
-            total += frame.airlight(number, source)
-            visibility += frame.visibility(number, source)
+        for number, lights in enumerate(by_source(view.tables)):
+            total += frame.airlight(number, lights)
+            visibility += frame.visibility(number, lights)
         return Layers(total, tuple(visibility))
 
 
@@ -145,25 +145,25 @@ class _Frame:
         self.depth = depth_guide(self.whole.distance, parameters.hz)
         self.few_depth = depth_guide(self.few.distance, parameters.hz)
 
-    def airlight(self, number: int, source: list[int]) -> Any:
+    def airlight(self, number: int, lights: LightTable) -> Any:
         """Return the radiance that a source scatters into every ray, in the order of the view."""
         view, p, few = self.view, self.parameters, self.few
-        state, like = self.states[number], view.lights[source[0]]
-        table = state.samples
+        state, like = self.states[number], lights[mi.UInt32(0)]
 
         def of_sample(index: Any, shift: Any = 0.5) -> Any:
-            light = like if table is None else table.light(index, like)
+            light = lights[index]
             how: dict[str, Any] = {"steps": p.steps, "spacing": p.spacing, "lit": self._lit(state, light, index)}
             return marched_integral(few.lit_by(light), few.distance, shift=shift, **how)
 
-        if table is None:
+        if like.facing is None:
             integral = of_sample(0)
         elif p.interleave:
-            fraction = self._fraction(self.few_raster, table.count)
-            integral = table.count * of_sample(fraction.number, fraction.shift)
+            fraction = self._fraction(self.few_raster, lights.count)
+            integral = lights.count * of_sample(fraction.number, fraction.shift)
             integral = tile_average(integral, self.few_raster, guides=(self.few_depth,))
         else:
-            integral = summed(table.count, of_sample, few.lit_by(like).nothing(dr.width(few.distance)))
+            nothing = few.lit_by(like).nothing(dr.width(few.distance))
+            integral = lights.sum(lambda _, index: of_sample(index), nothing)
         integral = _smooth_airlight(integral, self.few_raster, depth=self.few_depth, p=p)
         dr.eval(integral, self.few_depth)
         if p.scale == 1:
@@ -175,52 +175,51 @@ class _Frame:
             integral = upsample(integral, self.few_depth, own.values, self.few_raster, scale=p.scale, **place)
         return view.medium.radiance(like, integral)
 
-    def visibility(self, number: int, source: list[int]) -> list[Any]:
+    def visibility(self, number: int, lights: LightTable) -> list[Any]:
         """Return the fraction of a source that reaches the surfaces, or one for each of its lights."""
         view, p, whole = self.view, self.parameters, self.whole
-        lights = [view.lights[light] for light in source]
         if not view.features.shadows or not view.features.surfaces:
-            count = 1 if p.by_source else len(source)
+            count = 1 if p.by_source else lights.count
             return [dr.full(mi.Bool, True, self.raster.count) for _ in range(count)]
         there = dr.isfinite(view.distance)
         point = view.origin + view.direction * dr.select(there, view.distance, 0)
-        if lights[0].facing is None:
+        if lights.rows.facing is None:
             # Twenty units in the last place towards the camera: rounded behind its surface, a point is in its shadow.
             before = view.origin + view.direction * dr.select(there, view.distance * (1 - 2e-6), 0)
-            return [there & view.visible(before, lights[0])]
+            return [there & view.visible(before, lights.rows)]
         state = self.states[number]
         if p.filter == "none" and not p.interleave:
-            return [there & self._reached(state, place, light, point) for place, light in enumerate(lights)]
+            return [there & self._reached(state, place, lights[place], point) for place in range(lights.count)]
         if p.interleave:
-            number = self._fraction(self.raster, len(lights)).number
-            own = reached_surfaces(whole, state, lights[0], lambda _: number, 1, p)
+            number = self._fraction(self.raster, lights.count).number
+            own = reached_surfaces(whole, state, lights, lambda _: number, 1, p)
             if p.narrow:
                 # With the means over tiles: who asks for it later would cast its rays again.
                 dr.schedule(own.lit, own.all)
             lit = self._over_tiles(own).fraction
         else:
-            lit = reached_surfaces(whole, state, lights[0], lambda index: index, len(lights), p).fraction
+            lit = reached_surfaces(whole, state, lights, lambda index: index, lights.count, p).fraction
         if p.hd == AUTO:
             dr.eval(lit)
-            width = self._penumbra_width(state, lights[0])
+            width = self._penumbra_width(state, lights)
             dr.eval(width)
             if p.interleave and p.narrow:
                 lit = self._where_narrow(lit, width, own, number, state, lights)
                 del own  # two images that the filter needs not
-            lit = self._smooth_by_width(lit, width, len(lights))
+            lit = self._smooth_by_width(lit, width, lights.count)
         elif p.filter != "none":
             there, levels = dr.isfinite(whole.distance), state.flat and not p.interleave
             lit = _smooth_fraction(
-                lit, self.raster, there=there, depth=self.depth, points=len(lights), levels=levels, p=p
+                lit, self.raster, there=there, depth=self.depth, points=lights.count, levels=levels, p=p
             )
         lit = dr.clip(lit, 0, 1)
         dr.eval(lit)
         lit = dr.gather(type(lit), lit, view.pixel)
         return [lit]
 
-    def _penumbra_width(self, state: SourceState, like: Light) -> Any:
+    def _penumbra_width(self, state: SourceState, lights: LightTable) -> Any:
         few, step = few_pixels(self.raster)
-        blockers = blockers_of(self.rays(small_pixels(few, step, self.raster.width)), state, like)
+        blockers = blockers_of(self.rays(small_pixels(few, step, self.raster.width)), state, lights)
         distance, camera = self.whole.distance, self.view.camera
         return penumbra_width(blockers, distance, camera, state.width, self.raster, guide=self.depth)
 
@@ -230,7 +229,7 @@ class _Frame:
         return Reached(*tile_average(sums, self.raster, guides=(self.depth,)))
 
     def _where_narrow(
-        self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, lights: list[Light]
+        self, lit: Any, width: Any, own: Reached, number: Any, state: SourceState, lights: LightTable
     ) -> Any:
         """Return the fraction, with the rest of each pixel's group of light samples where penumbrae are narrow.
 
@@ -238,13 +237,13 @@ class _Frame:
         A pixel has already tested one sample of its group.
         """
         p = self.parameters
-        group = min(_GROUP, len(lights))
+        group = min(_GROUP, lights.count)
         asked = (lit > 0) & (lit < 1) & (width < p.narrow)
 
         def other(index: Any) -> Any:
             return number // group * group + (number + 1 + index) % group
 
-        more = reached_surfaces(self.whole, state, lights[0], other, group - 1, p, asked)
+        more = reached_surfaces(self.whole, state, lights, other, group - 1, p, asked)
         lit = dr.select(asked, Reached(own.lit + more.lit, own.all + more.all).fraction, lit)
         dr.eval(lit)
         return lit

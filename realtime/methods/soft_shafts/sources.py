@@ -22,14 +22,14 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from airlight.realtime.image_filters import Guide, Raster, separable, small_pixels, upsample
 from airlight.realtime.methods.interface.method import View
 from airlight.realtime.methods.soft_shafts.parameters import SoftShaftsParameters
 from airlight.realtime.numerics.array_types import two_numbers
 from airlight.realtime.scene.camera import Camera
-from airlight.realtime.scene.light_samples import LightTable, light_tables
-from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.light_table import LightTable
 from airlight.realtime.shadow_maps.hemisphere_map import HemisphereMaps, cast_hemisphere_maps
 from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 
@@ -38,30 +38,28 @@ from airlight.realtime.shadow_maps.shadow_map import ShadowMap, cast_shadow_map
 class SourceState:
     """The state of one source, made again when lights or shapes move."""
 
-    samples: LightTable | None  #: those of an area light
-    width: Any  #: of that light, of a square with its mean square extent [m]
-    flat: bool  #: whether all points of that light face the same way
+    width: Any  #: of an area light, of a square with its mean square extent [m]
+    flat: bool  #: whether all its samples face the same way
     maps: HemisphereMaps | ShadowMap | None  #: None where nobody asks them
 
 
 def source_state(
-    scene: Any, lights: list[Light], size: int, *, with_maps: bool, for_surfaces: bool = True
+    scene: Any, lights: LightTable, size: int, *, with_maps: bool, for_surfaces: bool = True
 ) -> SourceState:
     """Return the state of a source of some `lights`; `size` [texels] is that of its maps, also `for_surfaces`."""
-    Float = type(lights[0].position.x)
-    if lights[0].facing is None:
-        maps = cast_shadow_map(scene, lights[0], size) if with_maps else None
-        return SourceState(None, dr.opaque(Float, 0, 1), True, maps)
-    (table,) = light_tables(lights)
+    light = lights.rows
+    if light.facing is None:
+        maps = cast_shadow_map(scene, light, size) if with_maps else None
+        return SourceState(dr.opaque(type(light.position.x), 0, 1), True, maps)
     # The mean square distance from the middle of a square of the side L is L^2 / 6. It stays on the device.
-    spread = sum(dr.mean(dr.square(column - dr.mean(column))) for column in table.columns[:3])
+    spread = sum(dr.mean(dr.square(column - dr.mean(column))) for column in light.position)
     hemispheres = None
     if with_maps:
-        hemispheres = cast_hemisphere_maps(scene, table, lights[0], size, for_surfaces=for_surfaces)
-    flat = all(light.facing is lights[0].facing for light in lights)
+        hemispheres = cast_hemisphere_maps(scene, lights, size, for_surfaces=for_surfaces)
     width = dr.sqrt(6 * spread)
     dr.eval(width)
-    return SourceState(table, width, flat, hemispheres)
+    flat = all(np.ptp(np.array(component)) == 0 for component in light.facing.exact_normal)
+    return SourceState(width, flat, hemispheres)
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class Reached:
 def reached_surfaces(
     view: View,
     state: SourceState,
-    like: Light,
+    lights: LightTable,
     number_of: Callable[[Any], Any],
     count: int,
     p: SoftShaftsParameters,
@@ -105,7 +103,7 @@ def reached_surfaces(
 ) -> Reached:
     """Return the part of an area light that reaches `asked` surfaces of a view; others return 0.
 
-    `view`: the rays, row by row; `state`, `like`: the light, and one of its samples; `number_of`, `count`: which light
+    `view`: the rays, row by row; `state`, `lights`: the light and its samples; `number_of`, `count`: which light
     sample each ray asks first, second and so on, counted from 0, and how many; `p`: the parameters.
     """
     Float = type(view.distance)
@@ -113,7 +111,7 @@ def reached_surfaces(
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
 
     def of_sample(index: Any) -> list[Any]:
-        return _reached_of_sample(view, state, like, place, there, number_of(index), p)
+        return _reached_of_sample(view, state, lights, place, there, number_of(index), p)
 
     if count == 1:
         return Reached(*of_sample(mi.UInt32(0)))
@@ -131,11 +129,10 @@ def reached_surfaces(
 
 
 def _reached_of_sample(
-    view: View, state: SourceState, like: Light, place: Any, there: Any, number: Any, p: SoftShaftsParameters
+    view: View, state: SourceState, lights: LightTable, place: Any, there: Any, number: Any, p: SoftShaftsParameters
 ) -> list[Any]:
     """Return the terms of one light sample in the sums of `Reached`."""
-    assert state.samples is not None
-    light = state.samples.light(number, like)
+    light = lights[number]
     away = place - light.position
     square = dr.squared_norm(away)
     # Without shared samples those that face one way count alike: the fraction has N + 1 levels.
@@ -181,19 +178,18 @@ def penumbra_width(blockers: Any, distance: Any, camera: Camera, width: Any, ras
     return width * mean / pixel
 
 
-def blockers_of(view: View, state: SourceState, like: Light) -> Any:
+def blockers_of(view: View, state: SourceState, lights: LightTable) -> Any:
     """Return the sum of log((d_r - d_b) / d_b) over the light samples that something blocks, and how many these are.
 
-    `view`: rays to surfaces; `state`, `like`: the light, with its maps, and one of its samples.
+    `view`: rays to surfaces; `state`, `lights`: the light, with its maps, and its samples.
     """
-    Float, table, maps = type(view.distance), state.samples, state.maps
-    assert table is not None
+    Float, maps = type(view.distance), state.maps
     assert isinstance(maps, HemisphereMaps)
     there = dr.isfinite(view.distance)
     place = view.origin + view.direction * dr.select(there, view.distance, 0)
 
     def add(number: Any, near: Any, blocked: Any):
-        light = table.light(number, like)
+        light = lights[number]
         beyond = maps.of(number, light).beyond(place, there)
         before = there & (beyond > _NEARER) & (dr.dot(place - light.position, light.normal) > 0)
         return number + 1, near + dr.select(before, dr.log(beyond), 0), blocked + dr.select(before, Float(1), 0)
@@ -201,7 +197,7 @@ def blockers_of(view: View, state: SourceState, like: Light) -> Any:
     nothing = dr.zeros(Float, dr.width(view.distance))
     _, near, blocked = dr.while_loop(
         state=(mi.UInt32(0), nothing, +nothing),
-        cond=lambda number, near, blocked: number < table.count,
+        cond=lambda number, near, blocked: number < lights.count,
         body=add,
         labels=("number", "near", "blocked"),
     )

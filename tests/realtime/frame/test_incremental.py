@@ -38,7 +38,7 @@ STEPS = ("light", "medium", "colour", "camera", "light", "objects", "colour", "l
 
 
 def made(scene: Scene, method: str, **parameters) -> FrameRenderer:
-    kernel = KERNELS["exact" if scene.features.bounded else "taylor"]
+    kernel = KERNELS["exact" if scene.medium.bounded_media else "taylor"]  # soon compiled
     return frame_renderer(scene, METHODS[method], kernel=kernel, **parameters)
 
 
@@ -207,14 +207,9 @@ def test_frames_of_an_animation_are_the_same_in_parts(name, variant, monkeypatch
     monkeypatch.setattr(module, "_LARGE", 2048)
     monkeypatch.setattr(module, "_PART", 1024)
     prepared, kept = [], None
-    structures = {
-        key: replace(
-            stages,
-            prepare=lambda scene, run=stages.prepare: prepared.append(scene) or run(scene),
-        )
-        for key, stages in made.structures.items()
-    }
-    counted = replace(made, structures=structures)
+    prepare = made.stages.prepare
+    stages = replace(made.stages, prepare=lambda scene: prepared.append(scene) or prepare(scene))
+    counted = replace(made, stages=stages)
     for (now, moved), whole in zip(moves, expected, strict=True):
         frame, kept, _ = timed_image(counted, now, kept, **(STILL | moved))
         same(frame, whole)

@@ -214,7 +214,7 @@ def test_what_stands_still_is_kept(variant, moves, casts, prepared_frames):
         return run
 
     stages = replace(renderer.stages, surface=counted("surface"), prepare=counted("prepare"))
-    counting, kept = replace(renderer, structures=dict.fromkeys(renderer.structures, stages)), None
+    counting, kept = replace(renderer, stages=stages), None
     for moved in animate(scene, animation, 4):
         _, kept = next_frame(counting, moved, kept, **moved_parts(animation))
     assert calls == {"surface": casts, "prepare": prepared_frames}

@@ -91,7 +91,7 @@ def test_preparation_is_timed_when_what_was_prepared_before_is_gone(monkeypatch)
             return state
 
         stages = replace(renderer.stages, prepare=prepare)
-        return replace(renderer, structures=dict.fromkeys(renderer.structures, stages))
+        return replace(renderer, stages=stages)
 
     monkeypatch.setattr(module, "prepared", counted)
     row, _ = row_of("sphere-spot", configuration("soft-shafts"))
@@ -166,7 +166,8 @@ def test_a_frame_is_judged_by_the_preparation_of_all_its_groups_of_lights(clock,
         return prepare(renderer, scene)
 
     monkeypatch.setattr(FrameRenderer, "prepare", slowed)
-    monkeypatch.setattr(module, "light_groups", lambda renderer: ("first", "second"))
+    groups = FrameRenderer.groups.func
+    monkeypatch.setattr(FrameRenderer, "groups", property(lambda renderer: 2 * groups(renderer)))
     row = row_of("open-fog", MARCH, Measure("stages", 0.01, limit=0.5))[0]
     assert (row.status, row.error, row.times) == ("left out", None, None)
     assert "what a frame prepares takes 1 s, more than the limit of 0.5 s" in row.reason

@@ -19,6 +19,7 @@ from airlight.realtime.methods.published.billeter2010.mesh import THRESHOLD, mem
 from airlight.realtime.methods.published.billeter2010.raster import mesh_airlight
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.medium import Homogeneous
 from airlight.realtime.shadow_maps.projection import light_faces
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, check_maps, map_memory, map_size
 
@@ -58,10 +59,10 @@ class LightVolumes2010(Method):
     )
 
     def check(self, scene):
-        """Refuse bounded media, and more memory than the machine has."""
-        if scene.medium.bounded_media:
+        """Refuse media other than a homogeneous one without bounds, and more memory than the machine has."""
+        if not isinstance(scene.medium, Homogeneous) or scene.medium.bounded_media:
             raise InputError(
-                f"method {self.name}: the scene has a medium with bounds, expected one medium that fills all space; "
+                f"method {self.name}: expected one homogeneous medium that fills all space, and the scene has another; "
                 "use light-volumes"
             )
         if scene.features.shadows:

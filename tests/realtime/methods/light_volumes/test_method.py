@@ -21,6 +21,7 @@ from airlight.realtime.shadow_maps.inverse_depth_field import inverse_depth_fiel
 from airlight.realtime.shadow_maps.shadow_map import cast_shadow_map, inverse_depth
 from airlight.reference.scene.read import read_reference
 from airlight.validation.estimates.quadrature import reference_image
+from airlight.validation.scenes.loading import load_scene
 from tests.evidence.oracles.light_volume import oracle_airlight
 from tests.helpers.frames import render, renderer
 from tests.helpers.light_frames import (
@@ -262,11 +263,12 @@ def test_a_shadow_of_straight_edges_is_known_to_a_fraction_of_a_texel(variant):
 # Refusals and memory -------------------------------------------------------------------------------------------------
 
 
-def test_a_mesh_is_for_media_without_bounds(variant):
+def test_a_mesh_is_for_one_homogeneous_medium_without_bounds(variant):
     smoke = bounded_medium({"type": "sphere", "center": [0.1, 0.2, 0.9], "radius": 0.4}, 0.7, (0.9, 0.8, 0.7))
     loaded = mi.load_dict(clear_scene(cloud=smoke))
-    with pytest.raises(InputError, match=r"light-volumes-2010: the scene has a medium with bounds.*use light-volumes"):
-        renderer(loaded, "light-volumes-2010")
+    for other in (loaded, load_scene("street", (4, 3)).scene):  # height fog
+        with pytest.raises(InputError, match=r"light-volumes-2010: expected one homog.*use light-volumes"):
+            renderer(other, "light-volumes-2010")
     assert np.max(render(loaded, "light-volumes", map=16).airlight) > 0
 
 
