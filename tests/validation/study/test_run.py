@@ -35,17 +35,12 @@ from tests.helpers.scenes import tiny_scene
 
 SIZE = (24, 18)
 MARCH = Configuration("ray-march", None, (("steps", 200),))
-FEATURES = SceneFeatures(
-    shadows=True,
-    surfaces=True,
-    extinctions=1,
-    isotropic=True,
-    bounded=False,
-    vacuum=False,
-    point_lights=1,
-    spot_lights=0,
-    soft_spots=False,
-)
+
+
+def scene_with(*, shadows=True, clear=False, area_lights=("disk",)):
+    """Return of a scene what decides which configurations differ in it."""
+    features = SceneFeatures(shadows=shadows, surfaces=True)
+    return SimpleNamespace(features=features, medium=SimpleNamespace(clear=clear), area_lights=area_lights)
 
 
 USUAL, UNTIMED = Measure(), Measure("none")
@@ -214,14 +209,13 @@ def test_under_an_area_light_a_sixteenth_of_the_pixels_has_a_reference(own_cache
 
 
 def test_variants_of_shadows_are_left_out_where_nothing_casts_one():
-    lamp = replace(FEATURES, area_lights=("disk",))
-    assert configurations_for(replace(lamp, bounded=True, clear=True), STANDARD) == STANDARD
-    unbounded = configurations_for(lamp, STANDARD)
+    assert configurations_for(scene_with(clear=True), STANDARD) == STANDARD
+    unbounded = configurations_for(scene_with(), STANDARD)
     (left_out,) = (configuration for configuration in STANDARD if configuration not in unbounded)
     assert dict(left_out.parameters) == {"order": "exact", "media": "paper"}
-    without_points = configurations_for(FEATURES, STANDARD)
+    without_points = configurations_for(scene_with(area_lights=()), STANDARD)
     assert set(unbounded) - set(without_points) == {given for given in STANDARD if "points" in dict(given.parameters)}
-    left = configurations_for(replace(lamp, shadows=False), STANDARD)
+    left = configurations_for(scene_with(shadows=False), STANDARD)
     assert 0 < len(left) < len(STANDARD)
     assert all(not {"shadow", "map", "order"} & set(dict(configuration.parameters)) for configuration in left)
     assert {configuration.method for configuration in left} == set(FOG_METHODS)
