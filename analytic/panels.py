@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from airlight.analytic.kronrod import NARROW, WIDE, Pair
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import PhaseFunction, Tabulated
 from airlight.errors import InputError
 
 Array = NDArray[np.float64]
@@ -174,7 +174,7 @@ def _segments(columns: list[Array], rows: Index, integrand: _Integrand) -> _Segm
 def _folds(integrand: _Integrand) -> float:
     """Return after how many e-folds of decay to stop: more where the lobe can outweigh the decay."""
     phase = integrand.phase
-    if phase.table is not None or integrand.weight is not None:
+    if isinstance(phase, Tabulated) or integrand.weight is not None:
         return 745.0  # zeros are possible: only what underflows is left out, which costs one panel more
     ends = phase(np.array([-1.0, 0.0, 1.0]))
     if ends.min() == 0:

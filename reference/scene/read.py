@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HenyeyGreenstein, Isotropic, PhaseFunction, Rayleigh, Tabulated
 from airlight.errors import InputError
 from airlight.reference.scene.area_light import ReferenceAreaLight, is_area, read_area_light
 from airlight.reference.scene.camera import camera_matrix, film_directions, pixel_centres
@@ -72,7 +72,7 @@ class ReferenceMedium:
         return self.sigma_t
 
 
-VACUUM = ReferenceMedium(np.zeros(3), np.zeros(3), PhaseFunction("isotropic"), None)
+VACUUM = ReferenceMedium(np.zeros(3), np.zeros(3), Isotropic(), None)
 
 
 @dataclass(frozen=True)
@@ -352,13 +352,13 @@ def _read_phase(phase) -> PhaseFunction:
     parameters = mi.traverse(phase)
     name = phase.class_name()
     if name == "IsotropicPhaseFunction":
-        return PhaseFunction("isotropic")
+        return Isotropic()
     if name == "RayleighPhaseFunction":
-        return PhaseFunction("rayleigh")
+        return Rayleigh()
     if name == "HGPhaseFunction":
-        return PhaseFunction("hg", g=float(parameters["g"][0]))
+        return HenyeyGreenstein(float(parameters["g"][0]))
     if name == "TabulatedPhaseFunction":
-        return PhaseFunction("tabulated", table=tuple(float(v) for v in np.array(parameters["values"])))
+        return Tabulated(tuple(float(v) for v in np.array(parameters["values"])))
     raise InputError(f"the phase function is a {name}; expected one of isotropic, hg, rayleigh, tabphase")
 
 

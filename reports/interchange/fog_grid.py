@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HenyeyGreenstein, PhaseFunction, Tabulated
 from airlight.errors import InputError
 from airlight.reference.scene.varying import GridMedium, HeightMedium
 
@@ -73,9 +73,9 @@ def _whole_grid(medium: HeightMedium) -> tuple[Array, Array, Array]:
 
 
 def _phase(phase: PhaseFunction) -> str:
-    if phase.name == "hg":
+    if isinstance(phase, HenyeyGreenstein):
         return f'<phase type="hg"> <float name="g" value="{phase.g:.9g}"/> </phase>'
-    if phase.table is not None:
+    if isinstance(phase, Tabulated):
         values = ", ".join(f"{value:.9g}" for value in phase.table)
         return f'<phase type="tabphase"> <string name="values" value="{values}"/> </phase>'
     return f'<phase type="{phase.name}"/>'

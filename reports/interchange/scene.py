@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airlight.analytic.phase import HenyeyGreenstein, Tabulated
 from airlight.errors import InputError
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.scene.area_light import ReferenceAreaLight
@@ -141,8 +142,10 @@ def _medium(medium: ReferenceMedium | VaryingMedium) -> dict[str, Any] | None:
     if medium.plugin is None:
         return None
     phase: dict[str, Any] = {"name": medium.phase.name}
-    phase |= {"g": _number(medium.phase.g)} if medium.phase.name == "hg" else {}
-    phase |= {"table": _numbers(medium.phase.table)} if medium.phase.table is not None else {}
+    if isinstance(medium.phase, HenyeyGreenstein):
+        phase["g"] = _number(medium.phase.g)
+    if isinstance(medium.phase, Tabulated):
+        phase["table"] = _numbers(medium.phase.table)
     scattering = {"albedo": _numbers(medium.albedo), "phase": phase | {"formula": _PHASES[medium.phase.name]}}
     if isinstance(medium, GridMedium):
         return {

@@ -58,10 +58,13 @@ def kernels(*, kernel: Kernels = (), phase: str | None = None, progress: Progres
     progress
         Called with (fraction done, what); True shows a bar.
     """
-    from airlight.analytic.phase import phase_from_words
+    from airlight.analytic.phase import HenyeyGreenstein, phase_from_words
     from airlight.validation.kernels.benchmark import PHASES, bench_kernels, speed_against_error
 
-    phases = PHASES if phase is None else ((phase, phase_from_words(phase).g),)
+    phases: tuple[tuple[str, float], ...] = PHASES
+    if phase is not None:
+        chosen = phase_from_words(phase)
+        phases = ((phase, chosen.g if isinstance(chosen, HenyeyGreenstein) else 0.0),)
     named = [kernel_name(each) or "" for each in several(kernel)] or None
     with telling(progress, "kernels") as tell:
         found = bench_kernels(named, phases=phases, progress=counted(tell))

@@ -8,7 +8,7 @@ from scipy.special import roots_legendre
 
 from airlight.analytic.droplets import Droplets, Modified, optics
 from airlight.analytic.mie import angular_functions, coefficients, efficiencies, intensities
-from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.phase import HgDraine, phase_from_words
 from airlight.errors import InputError
 from airlight.validation.certified.files import certified_data
 from airlight.validation.kernels.case_files import integrate_cases, read_cases
@@ -138,7 +138,7 @@ FILE = certified_data("airlight_integral_droplets.csv")
 @pytest.mark.claim("hg-draine", tolerance="1e-8: quadrature across a peak of g = 0.99")
 @pytest.mark.parametrize("diameter", [12, *(pytest.param(d, marks=pytest.mark.slow) for d in (5, 23.5))])
 def test_hg_draine_has_mean_one_and_its_moments(diameter):
-    phase = PhaseFunction("hg-draine", diameter=diameter)
+    phase = HgDraine(diameter)
     expected = legendre_moments(phase, 8, breaks=(1.0, 10.0), degree=2000)
     assert expected[0] == pytest.approx(1, abs=1e-8)
     assert hg_draine_moments(diameter, 8) == pytest.approx(expected, abs=1e-8)

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun, phi
 from airlight.analytic.panels import airlight_segments
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import Isotropic
 from airlight.errors import InputError
 from tests.helpers.height_fog import drawn, rows
 
@@ -159,7 +159,7 @@ def _lowered(layer: Layer) -> Layer:
 
 
 def test_a_light_in_the_interval_and_lights_beyond_the_cap():
-    fog, phase = HeightFog((Layer(0.1, 0.0, 2.0),), floor=-1.0, cap=3.0), PhaseFunction("isotropic")
+    fog, phase = HeightFog((Layer(0.1, 0.0, 2.0),), floor=-1.0, cap=3.0), Isotropic()
     rays = HeightRays(*(np.array(v) for v in (1.0, 0.0, 5.0, 0.0, 1.0)))
     assert np.isposinf(height_fog_segments(fog, rays, 0.0, 9.0, phase)[0][0])
     assert np.isfinite(height_fog_segments(fog, rays, 0.0, 4.0, phase)[0][0])

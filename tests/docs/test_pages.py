@@ -108,7 +108,7 @@ def test_formulas_are_mathml_and_slips_are_named(monkeypatch):
 
 @pytest.mark.claim("errata-of-biri", tolerance="1e-7 relative")
 def test_the_derived_coefficients_of_the_errata_are_those_of_the_program():
-    from airlight.analytic.phase import PhaseFunction
+    from airlight.analytic.phase import phase_from_words
     from airlight.analytic.series import taylor_coefficients
 
     means = {"isotropic": 1, "rayleigh": 1, "hazy": 2, "murky": 83 / 33}
@@ -118,7 +118,7 @@ def test_the_derived_coefficients_of_the_errata_are_those_of_the_program():
     for name, index, printed, derived in rows:
         same = derived == "the same"
         for a in (0.3, 1.7):
-            coefficients = taylor_coefficients(a, PhaseFunction(name.lower()))
+            coefficients = taylor_coefficients(a, phase_from_words(name.lower()))
             expected = float(coefficients[..., int(index)]) * means[name.lower()]
             assert _value(printed if same else derived.strip("$"), a) == pytest.approx(expected, rel=1e-7)
             assert same or abs(_value(printed, a) - expected) > 1e-8

@@ -99,7 +99,7 @@ def _phase(name: str, change: Callable[..., Any]) -> Wrap:
 
     def around(function, self, down, up):
         value = function(self, down, up)
-        return change(value, self.g) if self.name == name else value
+        return change(value, getattr(self, "g", 0.0)) if self.name == name else value
 
     return Wrap("airlight.analytic.phase:PhaseFunction.from_half", around)
 

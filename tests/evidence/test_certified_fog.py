@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HenyeyGreenstein, Isotropic
 from airlight.reference.quadrature.homogeneous import HomogeneousField
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.stretches import Terms, lit_stretches, profile_of
@@ -178,7 +178,7 @@ def test_all_rows_again(area_rows):
 @pytest.mark.parametrize("number", range(len(area_lights.POINTS)))
 def test_the_reference_of_one_point(area_rows, number):
     row = area_rows["points"][number]
-    phase = PhaseFunction("isotropic") if row["g"] is None else PhaseFunction("hg", g=row["g"])
+    phase = Isotropic() if row["g"] is None else HenyeyGreenstein(row["g"])
     medium = ReferenceMedium(np.full(3, row["sigma_t"]), np.ones(3), phase, None)
     # In the plane of ray and light; what the normal has across the plane does not matter.
     beside = np.sqrt(max(0.0, 1 - row["axial"] ** 2 - row["across"] ** 2))

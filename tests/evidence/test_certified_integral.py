@@ -9,11 +9,11 @@ from flint import arb, ctx
 from mpmath import mpf, workdps
 
 import tests.evidence.certified.integral as module
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import Isotropic, phase_from_words
 from tests.evidence.certified.airlight_integral import FILES, enclosure, read, value
 from tests.evidence.certified.integral import integrate_certified, isotropic_closed_form
 
-ISOTROPIC = PhaseFunction("isotropic")
+ISOTROPIC = Isotropic()
 
 
 @pytest.mark.slow
@@ -24,7 +24,7 @@ def test_every_tag_to_eighteen_digits(data_folder):
     assert len({row["tag"] for row in rows}) == 12
     for row in rows:
         inputs = [float(row[name]) for name in ("t", "h", "x0", "x1", "sigma_t")]
-        value = integrate_certified(*inputs, PhaseFunction(row["phase"], g=float(row["g"])))
+        value = integrate_certified(*inputs, phase_from_words(row["phase"], g=float(row["g"])))
         with workdps(40):
             # the data are rounded to 20 digits, of which the leading zeros of some count
             assert abs(value / mpf(row["value"]) - 1) < 1e-18, row
@@ -95,7 +95,7 @@ def case(**changes):
 def test_an_unbounded_ray_agrees_with_quadratures_that_cut_it_elsewhere(name, g):
     """The two quadratures of `tests.evidence.certified.integral` share no code with the program."""
     row = case(phase=name, g=str(g), x1="inf", sigma_t="0.001")
-    separate = integrate_certified(2.0, 0.5, 0.0, float("inf"), 0.001, PhaseFunction(name, g=g), digits=25)
+    separate = integrate_certified(2.0, 0.5, 0.0, float("inf"), 0.001, phase_from_words(name, g=g), digits=25)
     with ctx.workprec(128):
         ball = enclosure(row)
         assert abs(ball / arb(str(separate)) - 1) < arb(10) ** -14  # printed in 15 digits

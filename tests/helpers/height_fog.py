@@ -8,7 +8,7 @@ import numpy as np
 
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.height_fog import HeightFog, HeightRays, Layer, height_fog_segments, height_fog_sun
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HenyeyGreenstein, PhaseFunction
 from airlight.validation.certified.files import certified_data
 
 #: Two layers between a floor under the ground and a cap.
@@ -63,7 +63,7 @@ def _row(cells) -> Row:
         cells["tag"],
         sun,
         HeightFog(layers, number["sigma_0"], bool(number["clamped"])),
-        PhaseFunction("hg", g=number["g"]),
+        HenyeyGreenstein(number["g"]),
         origin,
         direction / np.linalg.norm(direction),
         light / np.linalg.norm(light) if sun else light,
@@ -119,7 +119,7 @@ def drawn(seed: int, count: int = 40) -> list[Drawn]:
             light /= np.linalg.norm(light)
         x0 = float(random.uniform(0, 3))
         ends = x0, x0 + float(random.uniform(1, 12))
-        phase = PhaseFunction("hg", g=float(random.uniform(-0.8, 0.8)))
+        phase = HenyeyGreenstein(float(random.uniform(-0.8, 0.8)))
         found.append(Drawn(fog, phase, random.normal(size=3) * 3, unit[0], light, *ends, sun))
     return found
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from airlight.analytic.phase import hg_draine_fit
+from airlight.analytic.phase import HgDraine
 
 
 def hg_draine_moments(diameter: float, count: int):
@@ -13,7 +13,7 @@ def hg_draine_moments(diameter: float, count: int):
 
     hg has g^l. Twice c P_l = ((l + 1) P_{l+1} + l P_{l-1})/(2 l + 1) gives the moments of c^2 hg.
     """
-    fit = hg_draine_fit(diameter)
+    fit = HgDraine(diameter)
     order = np.arange(count)
     plain = fit.g_d ** np.arange(count + 2.0)
     once = ((order + 1) * plain[1 : count + 1] + order * np.append(0.0, plain)[:count]) / (2 * order + 1)

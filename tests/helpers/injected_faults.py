@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HenyeyGreenstein
 from airlight.reference.quadrature.image import quadrature_image
 from airlight.reference.quadrature.ray_values import ReferenceImage
 from airlight.reference.quadrature.replicates import PointPlan
@@ -32,7 +32,7 @@ _CHECKS = 2  # random shadow rays to each ray
 _POINTS = 128  # of area lights: 0.03 % off in the mean
 _HOLDS = "total"
 _FOOT = 0.3048  # [m]
-_LOBE = PhaseFunction("hg", g=0.43)
+_LOBE = HenyeyGreenstein(0.43)
 
 Make = Callable[[ReferenceScene], Array | None]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airlight.analytic.panels import airlight_segments
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import phase_from_words
 from airlight.realtime.numerics.array_types import ArrayTypes, aligned_array, array_types
 from airlight.realtime.rays import RayGeometry
 from airlight.realtime.scene.lights import Light
@@ -59,7 +59,7 @@ def true_values(rays, name="isotropic", g: Any = 0.0) -> Array:
     values = np.empty(columns[0].shape)
     for one in np.unique(columns[5]):
         own = columns[5] == one
-        phase = PhaseFunction(name, g=float(one) if name == "hg" else 0.0)
+        phase = phase_from_words(name, g=float(one))
         values[own], _ = airlight_segments(*(column[own] for column in columns[:5]), phase)
     return values
 

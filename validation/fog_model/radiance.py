@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from airlight.analytic.height_fog import HeightFog
+from airlight.analytic.phase import HenyeyGreenstein
 from airlight.reference.quadrature.height_fog import fog_of
 from airlight.reference.scene.read import ReferenceScene
 from airlight.reference.scene.varying import HeightMedium
@@ -106,7 +107,7 @@ def scene_fog(reference: ReferenceScene) -> Fog:
     return Fog(
         sigma_t=tuple(colour(each.sigma_t) for each in media) if height is None else ((1.0, 1.0, 1.0),),
         albedo=tuple(colour(medium.albedo) for medium in media),
-        phase=tuple(medium.phase.g if medium.phase.name == "hg" else None for medium in media),
+        phase=tuple(medium.phase.g if isinstance(medium.phase, HenyeyGreenstein) else None for medium in media),
         intensity=one,
         airlight=one,
         surface=one,

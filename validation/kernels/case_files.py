@@ -20,7 +20,7 @@ import numpy as np
 
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.panels import airlight_segments
-from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.phase import phase_from_words
 from airlight.errors import InputError
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.readers import read_csv
@@ -156,7 +156,7 @@ def integrate_cases(cases: Cases, *, rtol: float = 1e-10, table: Sequence[float]
     for name, g in sorted(set(zip(cases.phase, cases.g.tolist()))):
         rows = np.flatnonzero((np.array(cases.phase) == name) & (cases.g == g))
         columns = (cases.foot[rows], cases.height[rows], cases.x0[rows], cases.x1[rows], cases.sigma_t[rows])
-        phase = PhaseFunction(name, table=table) if name == "tabulated" else phase_from_words(name, g=g)
+        phase = phase_from_words(name, g=g, table=table)
         value[rows], error[rows] = airlight_segments(*columns, phase, rtol=rtol)
     return value, error
 

@@ -34,7 +34,7 @@ from functools import cache
 
 import numpy as np
 
-from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.phase import phase_from_words
 from airlight.validation.arrays import Array, Bools
 from airlight.validation.kernels.case_files import Cases
 from airlight.validation.kernels.cases import TABLE, relative_error
@@ -73,7 +73,7 @@ def underflow_allowance(cases: Cases, precision: str) -> Array:
 @cache
 def _peak(name: str, g: float) -> float:
     """Return the largest value of a phase function, which all have forward or backward."""
-    phase = PhaseFunction(name, table=TABLE) if name == "tabulated" else phase_from_words(name, g=g)
+    phase = phase_from_words(name, g=g, table=TABLE)
     return float(np.max(phase(np.array([-1.0, 1.0]))))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import quad
 
 from airlight.analytic.droplets import Modified, optics
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import Hazy, phase_from_words
 from airlight.analytic.series import taylor_coefficients
 from airlight.realtime.kernels.taylor import PRINTED_PHASES, printed_coefficients, taylor, taylor_printed
 from airlight.validation.arrays import Array, Bools
@@ -23,7 +23,7 @@ from airlight.validation.kernels.cases import evaluate_cases, relative_error
 from airlight.validation.kernels.rays import wide_rays
 
 _RAYS, _WIDE_RAYS = 48, 1 << 13
-_HAZY = PhaseFunction("hazy")
+_HAZY = Hazy()
 
 
 def formulas() -> dict[str, float]:
@@ -78,7 +78,7 @@ def _annex() -> dict[str, float]:
     a = np.linspace(0.13, 2.97, 30)  # sigma_t h
     found = {}
     for name in PRINTED_PHASES:
-        derived = taylor_coefficients(a, PhaseFunction(name), 4).T
+        derived = taylor_coefficients(a, phase_from_words(name), 4).T
         for number, (printed, true) in enumerate(zip(printed_coefficients(a, name), derived)):
             found[f"{name} c{number}"] = _compared(printed, true)
     for name, factor, power in (("hazy", 9, 8), ("murky", 50, 32)):

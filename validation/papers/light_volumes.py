@@ -24,7 +24,7 @@ import numpy as np
 
 from airlight.analytic.geometry import foot_and_height
 from airlight.analytic.panels import airlight_segments
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import Isotropic
 from airlight.realtime.frame.renderer import (
     FrameRenderer,
     evaluated,
@@ -242,7 +242,7 @@ def crossings_sum(loaded: Any, depth: Array, mesh: VolumeMesh, *, clamp: bool) -
         pixel, x, sign = (np.array(each) for each in (batch.pixel, batch.distance, batch.sign))
         drawn = np.ones(len(x), dtype=bool) if clamp else x < depth[pixel]
         pixel, sign, end = pixel[drawn], sign[drawn], np.minimum(x, depth[pixel])[drawn]
-        J, _ = airlight_segments(foot[pixel], height[pixel], 0.0, end, sigma, PhaseFunction("isotropic"))
+        J, _ = airlight_segments(foot[pixel], height[pixel], 0.0, end, sigma, Isotropic())
         np.add.at(total, pixel, sign * J)
     return total.reshape(reference.height, reference.width)
 

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from airlight.analytic import phase as analytic
 from airlight.analytic.droplets import Modified
-from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.phase import phase_from_words
 from airlight.errors import InputError
 from airlight.realtime.clouds.slab_orders.phases import AnglePhase, HenyeyGreensteinPhase, SlabPhase
 from airlight.realtime.droplets import CUT, droplet_series
@@ -47,22 +48,23 @@ def phase_pair(name: str) -> PhasePair:
         angles, heights = read_phase_file(Path(name))
         return PhasePair(name, tabulated_phase(angles, heights), lambda: Tabulated(angles, heights))
     known = phase_from_words(name)
-    if known.name in ("isotropic", "hg"):
-        if abs(known.g) > LARGEST_G:
+    if isinstance(known, analytic.Isotropic | analytic.HenyeyGreenstein):
+        g = known.g if isinstance(known, analytic.HenyeyGreenstein) else 0.0
+        if abs(g) > LARGEST_G:
             raise InputError(
-                f"phase: got the mean cosine {known.g:g}, expected -{LARGEST_G} to {LARGEST_G}, for example hg:0.85"
+                f"phase: got the mean cosine {g:g}, expected -{LARGEST_G} to {LARGEST_G}, for example hg:0.85"
             )
-        return PhasePair(name, HenyeyGreensteinPhase(known.g), lambda: HenyeyGreenstein(known.g))
-    if known.diameter is not None:
+        return PhasePair(name, HenyeyGreensteinPhase(g), lambda: HenyeyGreenstein(g))
+    if isinstance(known, analytic.HgDraine):
         return PhasePair(name, hg_draine_phase(known.diameter), lambda: _table(known))
-    if known.droplets is None:
+    if not isinstance(known, analytic.Mie):
         raise InputError(f"phase: got {name!r}, expected isotropic, hg:G, hg-draine, mie, mie-modified or FILE.csv")
     numbers = known.droplets.effective_radius, known.droplets.gamma, known.wavelength
-    deterministic = droplet_phase(*numbers, modified=known.name == "mie-modified")
+    deterministic = droplet_phase(*numbers, modified=isinstance(known, analytic.MieModified))
     return PhasePair(name, deterministic, lambda: _table(known))
 
 
-def _table(phase: PhaseFunction) -> Tabulated:
+def _table(phase: analytic.PhaseFunction) -> Tabulated:
     """Return droplets as a table, by angles that resolve the peak, and the place where one is cut out."""
     angles, edge = np.linspace(0.0, np.pi, _TABLE + 1), np.deg2rad(Modified.angle)
     if phase.name == "hg-draine":

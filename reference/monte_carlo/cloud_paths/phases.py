@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic import phase as analytic
 from airlight.errors import InputError
 
 Array = NDArray[np.float64]
@@ -115,16 +115,18 @@ def _aliases(weights: Array) -> tuple[Array, NDArray[np.uint32]]:
     return fraction, other
 
 
-def walk_phase(phase: PhaseFunction) -> WalkPhase:
+def walk_phase(phase: analytic.PhaseFunction) -> WalkPhase:
     """Return a phase function of the scene for the walk.
 
     Raises InputError for one that no scene has.
     """
-    if phase.name in ("isotropic", "hg"):
+    if isinstance(phase, analytic.Isotropic):
+        return HenyeyGreenstein(0.0)
+    if isinstance(phase, analytic.HenyeyGreenstein):
         return HenyeyGreenstein(phase.g)
-    if phase.name == "rayleigh":
+    if isinstance(phase, analytic.Rayleigh):
         return Rayleigh()
-    if phase.name == "tabulated":
+    if isinstance(phase, analytic.Tabulated):
         values = np.asarray(phase.table)
         return Tabulated(values / (0.5 * (values[1:] + values[:-1])).mean())
     raise InputError(f"the walk has no phase function '{phase.name}'; expected isotropic, hg, rayleigh or tabulated")

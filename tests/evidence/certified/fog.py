@@ -27,7 +27,7 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import PhaseFunction, phase_from_words
 from airlight.validation.certified.files import FOLDER
 from tests.evidence.certified.integral import integrate_certified
 from tests.evidence.certified.intervals import (
@@ -153,7 +153,7 @@ def _integrals(scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], par
     towards = minus(vector(light.position), origin)
     foot, across = dot(towards, d), cross(towards, d)
     height = mp.sqrt(dot(across, across))
-    plain = PhaseFunction(scene.phase, g=scene.g)
+    plain = phase_from_words(scene.phase, g=scene.g)
     faint = plain
     if light.beam < light.cutoff:
         (axis, _), *_ = spot_cones(light)

@@ -23,7 +23,7 @@ from typing import Any
 
 from mpmath import mp, mpf
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HenyeyGreenstein, PhaseFunction, Tabulated
 from airlight.errors import InputError
 
 _FEWEST_DIGITS = 15
@@ -105,7 +105,7 @@ def certified_slopes(
     with mp.workdps(40):
         size = abs(_by_path(mpf(foot), mpf(height), mpf(x0), mpf(x1), mpf(sigma_t), phase))
         for number, name in enumerate(SLOPES):
-            if name == "g" and phase.name != "hg":
+            if name == "g" and not isinstance(phase, HenyeyGreenstein):
                 slopes.append(mp.nan)
                 continue
             first, second = (_difference(place, phase, number, k * mpf(_STEP)) for k in (1, 2))
@@ -120,7 +120,9 @@ def _difference(place: tuple[float, ...], phase: PhaseFunction, number: int, ste
     ends = []
     for sign in (1, -1):
         foot, height, x0, x1, sigma_t = (mpf(v) + sign * step * (number == k) for k, v in enumerate(place))
-        own = PhaseFunction("hg", g=float(mpf(phase.g) + sign * step)) if number == len(place) else phase
+        own = phase
+        if isinstance(phase, HenyeyGreenstein) and number == len(place):
+            own = HenyeyGreenstein(float(mpf(phase.g) + sign * step))
         ends.append(_by_path(foot, height, x0, x1, sigma_t, own))
     return (ends[0] - ends[1]) / (2 * step)
 
@@ -232,7 +234,7 @@ def _beside_light(foot: Any, s0: Any, s1: Any, sigma_t: Any, phase: PhaseFunctio
 
 def _kinks(phase: PhaseFunction) -> list[Any]:
     """Return the cosines at which the slope of a table jumps, in the current precision."""
-    if phase.table is None:
+    if not isinstance(phase, Tabulated):
         return [mpf(float(c)) for c in phase.kinks]
     last = len(phase.kinks) + 1
     return [mpf(2 * k - last) / last for k in range(1, last)]

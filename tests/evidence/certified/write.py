@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mpmath import mp
 
-from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.phase import phase_from_words
 from tests.evidence.certified import airlight_integral, height_fog
 from tests.evidence.certified.integral import SLOPES, certified_slopes, integrate_certified
 
@@ -30,7 +30,7 @@ def _droplets(row: Row) -> dict[str, str]:
 
 def _slopes(row: Row) -> dict[str, str]:
     """The integral and its central differences, to 17 digits."""
-    ray, phase = [float(row[name]) for name in _RAY], PhaseFunction(row["phase"], g=float(row["g"]))
+    ray, phase = [float(row[name]) for name in _RAY], phase_from_words(row["phase"], g=float(row["g"]))
     numbers = [integrate_certified(*ray, phase, digits=17), *certified_slopes(*ray, phase)]
     names = ["value", *(f"d{name}" for name in SLOPES)]
     return {name: str(mp.nstr(number, 17)) for name, number in zip(names, numbers, strict=True)}

@@ -7,7 +7,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HenyeyGreenstein
 from airlight.errors import InputError
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.numerics.array_types import aligned_array, array_types
@@ -43,7 +43,7 @@ def forward(kernel, phase, inputs, number, precision):
 def test_certified_derivatives_are_those_of_the_integrand(rows):
     """By the ends they are the integrand; lengths times a factor and the extinction over it leave J times it."""
     place = foot, height, x0, x1, sigma_t = 1.25, 0.75, 0.0, 4.5, 0.5
-    phase = PhaseFunction("hg", g=0.25)
+    phase = HenyeyGreenstein(0.25)
     slopes = dict(zip(SLOPES, certified_slopes(*place, phase), strict=True))
     for name, x, sign in (("x0", x0, -1), ("x1", x1, 1)):
         r = np.hypot(x - foot, height)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airlight.analytic.panels import airlight_segments
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import Rayleigh
 from airlight.realtime.kernels.exact import exact, panels_mean, path_interval
 from airlight.realtime.kernels.registry import KERNELS
 from airlight.realtime.numerics.array_types import aligned_array, array_types
@@ -126,7 +126,7 @@ def test_soft_spots_against_the_reference(cutoff, beam):
     ends = np.sort(np.stack([enter, np.clip(first, enter, leave), np.clip(last, enter, leave), leave, closest]), axis=0)
     expected = np.zeros(count)
     for a, b in pairwise(ends):
-        part, _ = airlight_segments(foot, height, a, b, 0.3, PhaseFunction("rayleigh"), weight=weight, rtol=1e-9)
+        part, _ = airlight_segments(foot, height, a, b, 0.3, Rayleigh(), weight=weight, rtol=1e-9)
         expected = expected + part
     lit = expected > 1e-6
     assert lit.sum() > 300

@@ -5,7 +5,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import phase_from_words
 from airlight.realtime.kernels.closed_form import closed_form, scaled_e1
 from airlight.realtime.kernels.exact import exact
 from airlight.realtime.kernels.table import table, table_records
@@ -44,7 +44,7 @@ def test_it_is_the_integral_of_the_series(phase):
     g, (t, h, x0, x1, sigma_t) = 0.37, (1.3, 0.7, 0.0, 2.9, 0.43)
     value = kernel_values(taylor, (t, h, x0, x1, sigma_t), phase, g, precision="double")[0]
     with mpmath.workdps(30):
-        p = PhaseFunction(phase, g=g if phase == "hg" else 0.0)
+        p = phase_from_words(phase, g=g)
 
         def integrand(theta):
             return mpmath.exp(-sigma_t * h * (mpmath.sin(theta) + 1) / mpmath.cos(theta)) * p.mp(-mpmath.sin(theta))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airlight.analytic.droplets import Droplets, Modified, optics
-from airlight.analytic.phase import PhaseFunction, phase_from_words
+from airlight.analytic.phase import phase_from_words
 from airlight.errors import InputError
 from airlight.realtime.droplets import droplet_series, fraction_cut
 from airlight.realtime.scene.phase import named_phase
@@ -27,7 +27,7 @@ def test_against_the_analytic_side(variant):
     cosine = np.linspace(-1, 1, 2001).astype(np.float32)
     for name, g, phase in phases():
         value = np.broadcast_to(np.array(phase.evaluate(mi.Float(cosine)), dtype=np.float64), cosine.shape)
-        expected = PhaseFunction(name, g=g)(cosine.astype(np.float64))
+        expected = phase_from_words(name, g=g)(cosine.astype(np.float64))
         # float32: the sharpest lobe, g = 0.97, amplifies the rounding of 1 - g by 3/2 g/(1 - g).
         assert np.max(np.abs(value / expected - 1)) < 1e-5, (name, g)
 

@@ -8,7 +8,7 @@ import drjit as dr
 import numpy as np
 import pytest
 
-from airlight.analytic.phase import PHASE_NAMES, PhaseFunction
+from airlight.analytic.phase import PHASE_NAMES, phase_from_words
 from airlight.errors import InputError
 from airlight.realtime.kernels.registry import Kernel
 from airlight.realtime.kernels.stepping import quadrature
@@ -318,7 +318,7 @@ def test_reference_is_certified(rays):
     for tag in set(rays.tag):
         k = rays.tag.index(tag)
         name = rays.phase[k]
-        phase = PhaseFunction(name, g=float(rays.g[k]), table=TABLE if name == "tabulated" else None)
+        phase = phase_from_words(name, g=float(rays.g[k]), table=TABLE)
         columns = (rays.foot, rays.height, rays.x0, rays.x1, rays.sigma_t)
         expected = integrate_certified(*(float(column[k]) for column in columns), phase, digits=16)
         assert rays.value[k] == pytest.approx(float(expected), rel=1e-12), tag

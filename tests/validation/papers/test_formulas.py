@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airlight.analytic.panels import airlight_segments
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import Hazy
 from airlight.validation.papers import formulas
 from airlight.validation.papers.formulas import _angular_form, _compared, _moderate, _over_angle, _over_distance, _worst
 
@@ -15,7 +15,7 @@ from airlight.validation.papers.formulas import _angular_form, _compared, _moder
 def test_both_forms_of_the_integral_are_that_of_the_panels():
     for ray in ((1.0, 0.5, 3.0, 0.2), (-1.5, 0.7, 2.0, 0.6), (5.0, 1.2, 2.0, 0.1)):
         foot, height, length, sigma = ray
-        J, _ = airlight_segments(np.array([foot]), np.array([height]), 0.0, length, sigma, PhaseFunction("hazy"))
+        J, _ = airlight_segments(np.array([foot]), np.array([height]), 0.0, length, sigma, Hazy())
         assert _over_distance(*ray) == pytest.approx(J[0], rel=1e-9)
         assert _over_angle(*ray) == pytest.approx(J[0], rel=1e-9)
 

@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import HgDraine
 from airlight.errors import InputError
 from airlight.validation.slab.light import slab_numbers
 from airlight.validation.slab.phases import phase_pair, read_phase_file
@@ -67,9 +67,7 @@ def test_the_fit_to_droplets_is_the_same_on_both_sides(diameter):
     pair = phase_pair(f"hg-draine:{diameter}")
     assert pair.deterministic.moments(300) == pytest.approx(hg_draine_moments(diameter, 300), abs=1e-12)
     cosines = np.linspace(-1, 1, 1001)
-    assert pair.deterministic.values(cosines) == pytest.approx(
-        PhaseFunction("hg-draine", diameter=diameter)(cosines), rel=1e-9
-    )
+    assert pair.deterministic.values(cosines) == pytest.approx(HgDraine(diameter)(cosines), rel=1e-9)
     drawn = pair.sampled().cosines((np.arange(200_000) + 0.5) / 200_000)
     assert drawn.mean() == pytest.approx(pair.deterministic.moments(2)[1], abs=1e-5)
 

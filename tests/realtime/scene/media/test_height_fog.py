@@ -12,7 +12,7 @@ from airlight.analytic.height_fog import HeightFog as HostFog
 from airlight.analytic.height_fog import HeightRays as HostRays
 from airlight.analytic.height_fog import Layer as HostLayer
 from airlight.analytic.height_fog import height_fog_segments
-from airlight.analytic.phase import PhaseFunction
+from airlight.analytic.phase import phase_from_words
 from airlight.errors import InputError
 from airlight.realtime.frame.renderer import frame_renderer, render_frame
 from airlight.realtime.kernels.registry import KERNELS
@@ -124,9 +124,9 @@ def test_no_panel_misses_a_layer(variant, clamped):
     foot, height = foot_and_height(origin, direction, place)
     lines = HostRays(origin[:, 2], direction[:, 2], foot, height, place[:, 2])
     for fog in fogs:
-        values = height_fog_segments(fog, lines, x0, x1, PhaseFunction("hg", g=0.35), rtol=1e-8)[0]
+        values = height_fog_segments(fog, lines, x0, x1, phase_from_words("hg:0.35"), rtol=1e-8)[0]
         chosen = [
-            Row("drawn", False, fog, PhaseFunction("hg", g=0.35), *row)
+            Row("drawn", False, fog, phase_from_words("hg:0.35"), *row)
             for row in zip(origin, direction, place, x0, x1, values)
             if row[-1] > 1e-12 * np.quantile(values, 0.9)
         ]
