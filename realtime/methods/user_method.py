@@ -181,7 +181,7 @@ def user_object(name: str, kind: str) -> Any:
     if not module_name or not all(part.isidentifier() for part in path.split(".")):
         raise InputError(f"{kind}: got {name!r}, {_WANTED}")
     what = f"{kind} {name}"
-    with user_errors(what), _no_bytecode():
+    with user_errors(what):
         module = _from_file(Path(module_name), what) if _is_file(module_name) else _from_path(module_name, what)
     named_object: Any = module
     for part in path.split("."):
@@ -194,13 +194,15 @@ def user_object(name: str, kind: str) -> Any:
 
 
 @contextmanager
-def _no_bytecode() -> Iterator[None]:
-    """Within the block, imports write no `__pycache__`: loading a user's file leaves nothing beside it."""
+def _imports_from(folder: str) -> Iterator[None]:
+    """Within the block, a folder is the first on the path, and imports write no `__pycache__` into it."""
     before = sys.dont_write_bytecode
     sys.dont_write_bytecode = True
+    sys.path.insert(0, folder)
     try:
         yield
     finally:
+        sys.path.remove(folder)
         sys.dont_write_bytecode = before
 
 
@@ -215,17 +217,15 @@ def _from_path(module_name: str, what: str) -> ModuleType:
     if not all(part.isidentifier() for part in module_name.split(".")):
         raise InputError(f"{what}: no module can have the name {module_name!r}; {_WANTED}")
     folder = os.getcwd()
-    sys.path.insert(0, folder)
     try:
-        importlib.invalidate_caches()
-        return importlib.import_module(module_name)
+        with _imports_from(folder):
+            importlib.invalidate_caches()
+            return importlib.import_module(module_name)
     except ModuleNotFoundError as error:
         missing = error.name or ""
         if missing and f"{module_name}.".startswith(f"{missing}."):
             raise InputError(f"{what}: there is no module {missing!r} in {folder} or installed; {_WANTED}") from None
         raise
-    finally:
-        sys.path.remove(folder)
 
 
 def _from_file(path: Path, what: str) -> ModuleType:
@@ -245,14 +245,12 @@ def _from_file(path: Path, what: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     module.__dict__["__airlight_stamp__"] = stamp
     sys.modules[key] = module
-    sys.path.insert(0, str(place.parent))  # its neighbours are there for it, as if it were run
     try:
-        spec.loader.exec_module(module)
+        with _imports_from(str(place.parent)):  # its neighbours are there for it, as if it were run
+            spec.loader.exec_module(module)
     except BaseException:
         del sys.modules[key]
         raise
-    finally:
-        sys.path.remove(str(place.parent))
     return module
 
 
