@@ -8,10 +8,10 @@ frame is not frozen. All that moves (camera, lights, medium, shadow maps) is pas
 `realtime.frame.incremental` says what the next frame uses again.
 
 Lights are tables (`realtime.scene.light_table`), one for each structure and area light. A method that looks at all
-lights together has one group of all tables. Every other method has a group for each light, a table of one row, and
-lights of one structure share a recording: neither the code of a kernel nor the time to compile it grows with the
-lights. Surfaces are shaded by whole tables, in one loop over lights, except where the method says which of its lights
-reaches them.
+lights together has one group of all tables; one that has no state sums a table in one loop, and a table is a group.
+Every other method has a group for each light, a table of one row, and lights of one structure share a recording:
+neither the code of a kernel nor the time to compile it grows with the lights. Surfaces are shaded by whole tables, in
+one loop over lights, except where the method says which of its lights reaches them.
 
 Parts: a large image of a method that computes each ray by itself is rendered in parts, one after the other: the
 intermediate arrays are then as large as a part. Where the method needs the whole image, its stage is not frozen if the
@@ -43,7 +43,7 @@ from airlight.realtime.numerics.noise import Noise, blue_mask
 from airlight.realtime.numerics.recorded import Frozen, refusals
 from airlight.realtime.parameters import values
 from airlight.realtime.scene.camera import TILE, tiled_pixels
-from airlight.realtime.scene.light_table import LightTable, light_samples, light_tables, structure
+from airlight.realtime.scene.light_table import LightTable, alike, light_samples, light_tables, structure
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.read_scene import Scene
 
@@ -69,13 +69,18 @@ class LightGroup:
 
     scene: Scene  #: with these lights alone
 
+    @property
+    def source(self) -> int | None:
+        """The number of the area light of whose samples the group is; None for other lights."""
+        return self.scene.lights[0].source if self.scene.lights else None
+
     @cached_property
     def tables(self) -> tuple[LightTable, ...]:
-        """The lights for recorded functions; a sample by itself is of area light 0, as one recording serves all."""
-        lights = self.scene.lights
-        if len(lights) == 1 and lights[0].source:
-            lights = (replace(lights[0], source=0),)
-        return light_tables(lights)
+        """The lights for recorded functions; a table by itself is of area light 0, as one recording serves all."""
+        tables = light_tables(self.scene.lights)
+        if len(tables) == 1 and self.source:
+            tables = (replace(tables[0], rows=replace(tables[0].rows, source=0)),)
+        return tables
 
 
 @dataclass(frozen=True)
@@ -107,9 +112,8 @@ class FrameRenderer:
 
     @cached_property
     def groups(self) -> tuple[LightGroup, ...]:
-        """The groups of lights of the scene as it is now: all together, or one by one."""
-        together = self.method.at_once or self.extra_layers
-        return light_groups(self.scene, self.lights, together=together)
+        """The groups of lights of the scene as it is now."""
+        return light_groups(self.scene, self.lights, self.method, together=self.extra_layers)
 
     @cached_property
     def shaded(self) -> tuple[tuple[LightTable, ...], ...]:
@@ -167,7 +171,7 @@ def frame_renderer(
     extra_layers &= not scene.area_lights
     # Groups of one structure need the same memory and are refused alike.
     lights = scene.lights + light_samples(scene, samples.points, samples.pattern)
-    groups = light_groups(scene, lights, together=chosen.at_once or extra_layers)
+    groups = light_groups(scene, lights, chosen, together=extra_layers)
     for group in {tuple(structure(light)[1] for light in each.scene.lights): each for each in groups}.values():
         chosen.check(group.scene)
     pixel = aligned_array(mi.UInt32, tiled_pixels(scene.camera.width, scene.camera.height))
@@ -186,10 +190,15 @@ def frame_renderer(
     )
 
 
-def light_groups(scene: Scene, lights: tuple[Light, ...], *, together: bool) -> tuple[LightGroup, ...]:
-    """Return the groups of some lights of a scene: all together, or one by one."""
-    several = [lights] if together else [(light,) for light in lights]
-    return tuple(LightGroup(replace(scene, lights=own)) for own in several)
+def light_groups(scene: Scene, lights: tuple[Light, ...], method: Method, *, together: bool) -> tuple[LightGroup, ...]:
+    """Return the groups of some lights of a scene: all together, those that are alike, or one by one."""
+    if method.at_once or together:
+        groups = [lights]
+    elif method.by_table:
+        groups = alike(lights)
+    else:
+        groups = [(light,) for light in lights]
+    return tuple(LightGroup(replace(scene, lights=group)) for group in groups)
 
 
 def _check_clouds(scene: Scene, method: Method) -> None:
@@ -399,7 +408,7 @@ def run_method(renderer: FrameRenderer, state, cast: Cast, by_light, carried: An
         shaded = by_light[number] if by_light[number] is not None else _shaded(renderer, group.tables, cast)
         own = state[number] if state[number] is not None else renderer.stages.prepare(group.scene)
         rendered = _run_group(renderer, group, own, cast, shaded, first=number == 0, last=carried, noise=noise)
-        if (scale := scales.get(group.scene.lights[0].source if group.scene.lights else None)) is not None:
+        if (scale := scales.get(group.source)) is not None:
             rendered = replace(rendered, airlight=rendered.airlight * scale)
         if sums is None:
             sums = rendered

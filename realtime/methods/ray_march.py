@@ -87,6 +87,11 @@ class RayMarch(Method):
             raise InputError(f"animate: got {self.animate} without jitter, expected jitter=white, blue or ign with it")
 
     @property
+    def by_table(self):
+        """Maps are a state of each light."""
+        return self.shadow != "map"
+
+    @property
     def uses_kernel(self):
         """Runs of lit steps are integrated by a kernel."""
         return self.sum == "transitions"
@@ -101,8 +106,8 @@ class RayMarch(Method):
             check_maps(scene.lights, self.map)
 
     def prepare(self, scene, light):
-        """Return the shadow map of a light, if it is asked for."""
-        return cast_shadow_map(scene.geometry, light, self.map) if self.shadow == "map" else ()
+        """Return the shadow map of a light."""
+        return cast_shadow_map(scene.geometry, light, self.map)
 
     def airlight(self, view, light, state, kernel):
         """Return the airlight of every ray by marching [W/(m^2 sr)]."""

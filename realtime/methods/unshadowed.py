@@ -60,6 +60,11 @@ class Unshadowed(Method):
         return self.form == "airlight"
 
     @property
+    def by_table(self):
+        """Light that nothing shadows needs no state."""
+        return self.form == "airlight"
+
+    @property
     def at_once(self):
         """A fog colour is one for all lights."""
         return self.form != "airlight"

@@ -79,10 +79,15 @@ def structure(light: Light) -> Any:
 
 def light_tables(lights: Sequence[Light]) -> tuple[LightTable, ...]:
     """Return the tables of some lights, in the order of the first of each; one at infinity is a table by itself."""
-    alike: dict[Any, list[Light]] = {}
+    return tuple(map(_table, alike(lights)))
+
+
+def alike(lights: Sequence[Light]) -> list[tuple[Light, ...]]:
+    """Return the lights of each table."""
+    several: dict[Any, list[Light]] = {}
     for number, light in enumerate(lights):
-        alike.setdefault(structure(light) if light.w else number, []).append(light)
-    return tuple(_table(several) for several in alike.values())
+        several.setdefault(structure(light) if light.w else number, []).append(light)
+    return list(map(tuple, several.values()))
 
 
 def by_source(tables: Iterable[LightTable]) -> Iterator[LightTable]:
@@ -99,7 +104,7 @@ def one_by_one(table: LightTable) -> Iterator[LightTable]:
     return (LightTable(table[number], 1) for number in range(table.count))
 
 
-def _table(lights: list[Light]) -> LightTable:
+def _table(lights: tuple[Light, ...]) -> LightTable:
     if len(lights) == 1:
         return LightTable(lights[0], 1)
     # All in one transfer, as each waits for the device.

@@ -21,6 +21,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
+import drjit as dr
+
 from airlight.realtime.area_lights.points import LightSamples
 from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import Metres, PerRay
@@ -203,6 +205,7 @@ class Method(Parameters):
     by_rays: ClassVar[bool] = False  #: whether each ray is computed by itself, so that any pixels can be rendered alone
     frozen: ClassVar[bool] = True  #: whether Dr.Jit can record it once and replay it
     at_once: ClassVar[bool] = False  #: whether it is given all lights and light samples of a frame at once
+    by_table: ClassVar[bool] = False  #: whether `airlight` has no state: lights that are alike are then one loop
     by_source: ClassVar[bool] = False  #: whether its visibility has one entry for all samples of an area light
     carries: ClassVar[bool] = False  #: whether it hands arrays on to the next frame, as `Layers.carried`
     history: ClassVar[Any] = None  #: how frames are averaged (`realtime.methods.history.History`); None: not at all
@@ -236,12 +239,17 @@ class Method(Parameters):
 
     def preparation(self, scene: Scene) -> Preparation:
         """Return a function that makes the state of all lights; constant data of the scene are read here."""
-        if not scene.features.shadows:
+        if self.by_table or not scene.features.shadows:
             return no_state
         return lambda now: tuple(self.prepare(now, light) for light in now.lights)
 
     def render(self, view: View, state: Any, kernel: Any) -> Layers:
         """Return the layers of every ray: the sum over the lights."""
+        if self.by_table:
+            total = dr.zeros(type(view.medium.albedo), dr.width(view.pixel))
+            for table in view.tables:
+                total = table.sum(lambda light, _: self.airlight(view, light, None, kernel), total)
+            return Layers(total)
         total, visibility = type(view.medium.albedo)(0), []
         for light, own in zip(view.lights, state or (None,) * len(view.lights), strict=True):
             found = self.airlight(view, light, own, kernel)
