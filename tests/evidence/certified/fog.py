@@ -91,16 +91,17 @@ class CertifiedPixel:
 class SpotPhase(PhaseFunction):
     """A phase function times the fall-off of a spot between beam and cut-off, along one ray."""
 
-    axial: Any = 0  #: axis . direction
-    across: Any = 0  #: axis . n, n the unit vector from the light to the foot point
-    angles: tuple[float, float] = (0.0, 90.0)  #: beam and cut-off [degrees]
+    phase: PhaseFunction
+    axial: Any  #: axis . direction
+    across: Any  #: axis . n, n the unit vector from the light to the foot point
+    angles: tuple[float, float]  #: beam and cut-off [degrees]
 
     def mp(self, cos_scatter: Any) -> Any:
         """Evaluate one cosine in mpmath at its current precision."""
         c = mpf(cos_scatter)
         cos_axis = -c * self.axial + mp.sqrt(1 - c * c) * self.across
         beam, cutoff = (mp.radians(mpf(angle)) for angle in self.angles)
-        return super().mp(c) * (cutoff - mp.acos(cos_axis)) / (cutoff - beam)
+        return self.phase.mp(c) * (cutoff - mp.acos(cos_axis)) / (cutoff - beam)
 
 
 def directions(scene: FogScene) -> tuple[tuple[float, ...], ...]:
@@ -158,13 +159,7 @@ def _integrals(scene: FogScene, light: FogLight, ray: tuple[Vector, Vector], par
     if light.beam < light.cutoff:
         (axis, _), *_ = spot_cones(light)
         normal = cross(across, d)  # from the light to the foot point: (t x d) x d = (t . d) d - t
-        faint = SpotPhase(
-            scene.phase,
-            g=scene.g,
-            axial=dot(axis, d),
-            across=dot(axis, normal) / height,
-            angles=(light.beam, light.cutoff),
-        )
+        faint = SpotPhase(plain, dot(axis, d), dot(axis, normal) / height, (light.beam, light.cutoff))
     integrals: list[Number] = []
     for channel, sigma_t in enumerate(scene.sigma_t):
         if channel and sigma_t == scene.sigma_t[0]:

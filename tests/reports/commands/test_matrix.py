@@ -31,7 +31,8 @@ ESTIMATORS = ("quadrature", "single-scatter", "volpath", "cloud-paths")
 _OF_CLOUDS = dict.fromkeys((*CLOUDS, "cloud-paths"), "cloud")
 REFUSED: dict[str, dict[str, str]] = {kind: _OF_CLOUDS for kind in KINDS}
 REFUSED["density grid"] = _OF_CLOUDS | dict.fromkeys(SUMS, "grid")
-REFUSED["bounded media"] = _OF_CLOUDS | {"light-volumes-2010": "bounds"}
+for _kind in ("bounded media", "height fog, lamp", "height fog, sun"):
+    REFUSED[_kind] = _OF_CLOUDS | {"light-volumes-2010": "homogeneous"}
 REFUSED["cloud"] = dict.fromkeys(FOG, "sky")
 
 #: The kinds of the default tier.
