@@ -24,7 +24,8 @@ Rooms:
 - `export/`: kernels as shader code;
 - `intervals.py`: the lit intervals of rays and their sum;
 - `clouds/`: light scattered more than once;
-- `methods/`: the methods, and in `methods/interface/` what all of them share with frames;
+- `methods/`: the methods, in `methods/interface/` what all of them share with frames, and in `methods/published/` what
+  papers do otherwise;
 - `frame/`: camera rays, the lit surface, and whole frames, one or the next.
 
 **One frame, from XML to pixel**: the files of this room that `airlight render hall --method shadow-planes` passes, in

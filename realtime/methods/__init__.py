@@ -13,6 +13,7 @@ Read in this order:
 - `cloud_octaves.py`: clouds as engines render them.
 - `cloud_collectors.py`: light of many orders in clouds, from where it enters them.
 - `registry.py`: the methods by name, and how a name becomes a method.
+- `published/`: methods as their papers have them, with their errors.
 - `shader/`: a user's shader, drawn by OpenGL in a separate process.
 - `user_method.py`: a user's plain function or class, made a method with its errors named and its results checked.
 """
