@@ -20,15 +20,6 @@ With the extinctions kappa_i and the lengths of the stretches in clouds, light f
 
     T = prod exp(-kappa_i (x_{i+1} - x_i)),        opacity = 1 - T.
 
-Printed is (Bouthors 2008, eq. 2)
-
-    opacity = sum (exp(-kappa_i x_{i+1}) - exp(-kappa_i x_i)) / kappa_i.
-
-Its sign is wrong: it integrates exp(-kappa x), which falls. It is a length, since the factor kappa is missing, and each
-exponent has the local kappa times the whole distance instead of the depth cumulated up to there. As printed the opacity
-is negative, and more light comes out than went in; x is counted from where the ray enters the first cloud. In a grid
-kappa is that in the middle of a step.
-
 **Single scattering in clouds, by steps on which the segments of the light are linear.**
 
 Light of the irradiance E that comes from a direction reaches the point at x after the depth l(x), and the eye after
@@ -40,7 +31,7 @@ On a step u = tau + l is linear between two nodes, du = kappa dx + dl, so that w
 
     int kappa exp(-u) dx = kappa dx/(kappa dx + dl) (e_i - e_{i+1}),
 
-and kappa dx e where dl = -kappa dx. Printed (Bouthors 2008, eq. 1) are the other sign and no factor: e_{i+1} - e_i.
+and kappa dx e where dl = -kappa dx.
 In a polyhedron l is linear between kinks and jumps, where rays and segments cross edges, so the error is that of the
 steps with one of these in them.
 
@@ -86,6 +77,10 @@ def opacity_of(depths: tuple[Any, ...], Color) -> Any:
     return Color(*fractions)
 
 
+#: Returns the light of a step, of its depth, and of the depths to the eye and of the segment at its ends.
+StepIntegral = Callable[[Any, tuple[Any, Any], tuple[Any, Any]], Any]
+
+
 @dataclass(frozen=True)
 class CloudRays:
     """Rays through clouds."""
@@ -124,13 +119,13 @@ def cloud_rays(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, 
 
 
 def light_once(
-    rays: CloudRays, beams: Sequence[Beam], *, steps: int, stride: Any, printed: bool = False
+    rays: CloudRays, beams: Sequence[Beam], *, steps: int, stride: Any, integral: StepIntegral | None = None
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)].
 
     `rays`: rays through clouds; `beams`: the lights; `steps`: N of `realtime.clouds.single_scattering`, in a ray; a
-    stretch in a cloud has one more; `stride`: the longest step in a grid where a ray enters [voxels]; `printed`:
-    whether to sum what the paper prints.
+    stretch in a cloud has one more; `stride`: the longest step in a grid where a ray enters [voxels]; `integral`: over
+    a step, `step_integral` by default.
 
     Valid for any extinction and thickness; `steps` is at least 1.
 
@@ -164,7 +159,7 @@ def light_once(
         shown = tuple(0.5 * (old + new) for old, new in zip(lit, next_lit))
         ends = (depths, after), (segments, next_segments)
         # Where a stretch begins, so do the segments: its first step has no length.
-        sums = with_step(clouds, beams, sums, own, *ends, shown, cloud, end > begin, printed=printed)
+        sums = with_step(clouds, beams, sums, own, *ends, shown, cloud, end > begin, integral or step_integral)
         return (after, next_segments, next_lit, sums), least(after) < OPAQUE
 
     def zeros(count: int):
@@ -177,30 +172,6 @@ def light_once(
     return finished(clouds, beams, sums)
 
 
-def opacity_as_printed(surfaces: CloudSurfaces, clouds: Clouds, origin, direction, end, *, stride: Any) -> Any:
-    """Return the printed opacity of clouds, a colour [m]; arguments as of `depths_along`.
-
-    Bouthors, Neyret, Max, Bruneton, Crassin 2008, eq. 2.
-    """
-    Float, Color, lanes = type(direction.x), type(clouds.albedo), dr.width(direction)
-
-    def add(total, begin, finish, inside, cloud):
-        first, sums = total
-        rho = middle_density(clouds, origin, direction, begin, finish, cloud)
-        kappas = [dr.gather(Float, sigma_t, cloud) * rho for sigma_t in clouds.sigma_t]
-        first = dr.minimum(first, begin)
-        near, far = begin - first, finish - first
-        terms = [dr.select(kappa > 0, (dr.exp(-kappa * far) - dr.exp(-kappa * near)) / kappa, 0) for kappa in kappas]
-        return (first, tuple(own + term for own, term in zip(sums, terms))), mi.Bool(True)
-
-    def step(total, x, cloud):
-        return stride * voxel(clouds, cloud)
-
-    nothing = dr.full(Float, dr.inf, lanes), tuple(dr.zeros(Float, lanes) for _ in clouds.sigma_t)
-    _, sums = march(surfaces, origin, direction, end, nothing, step=step, add=add)
-    return Color(*(sums * (3 // len(sums))))
-
-
 def reaching(rays: CloudRays, beams: Sequence[Beam], x) -> tuple[Any, Any]:
     """Return by beam the depths of the segments to rays at a distance [m], and 1 where no surface is in the way."""
     Float, point = type(x), rays.origin + rays.direction * x
@@ -211,7 +182,7 @@ def reaching(rays: CloudRays, beams: Sequence[Beam], x) -> tuple[Any, Any]:
 
 
 def with_step(
-    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, segments, lit, cloud, long, *, printed: bool
+    clouds: Clouds, beams: Sequence[Beam], sums, own, depths, segments, lit, cloud, long, integral: StepIntegral
 ) -> tuple[tuple[Any, ...], ...]:
     """Return sums by beam and octave with the light of a step in a cloud of some number, where it has a length.
 
@@ -225,7 +196,7 @@ def with_step(
         tuple(
             total + dr.select(long, term * (albedo * shown * (chosen_value(values, phase) if several else 1)), 0)
             for total, term, values in zip(
-                totals, step_light(beam, own, depths, (was, now), printed=printed), beam.phases, strict=True
+                totals, step_light(beam, own, depths, (was, now), integral), beam.phases, strict=True
             )
         )
         for beam, totals, was, now, shown in zip(beams, sums, *segments, lit, strict=True)
@@ -244,28 +215,26 @@ def finished(clouds: Clouds, beams: Sequence[Beam], sums) -> tuple[tuple[Any, ..
     )
 
 
-def step_light(beam: Beam, own, depths, segments, *, printed: bool) -> list[Any]:
+def step_light(beam: Beam, own, depths, segments, integral: StepIntegral) -> list[Any]:
     """Return the integrals of exp(-tau - a l) dtau over a step by octave, colours [1].
 
     `beam`: the light; `own`: the depth of the step, by channel [1]; `depths`, `segments`: tau and l at its two ends, by
-    channel [1]; `printed`: whether to return what the paper prints.
+    channel [1].
     """
     Color = type(beam.irradiance)
     by_octave = []
     for scale in beam.scales:
         parts = [
-            _step(part, (before, then), (scale * segment, scale * next_segment), printed=printed)
+            integral(part, (before, then), (scale * segment, scale * next_segment))
             for part, before, then, segment, next_segment in zip(own, *depths, *segments, strict=True)
         ]
         by_octave.append(Color(*(parts * (3 // len(parts)))))
     return by_octave
 
 
-def _step(depth, eye, segment, *, printed: bool):
+def step_integral(depth, eye, segment):
     """Return the integral over a step of a `depth`, from the depths to the `eye` and of the `segment` at the ends."""
     first, last = eye[0] + segment[0], eye[1] + segment[1]
-    if printed:
-        return dr.exp(-last) - dr.exp(-first)
     change = dr.abs(depth + (segment[1] - segment[0]))
     _, less = exp_expm1_bounded(-change)
     return depth * exp_bounded(-dr.minimum(first, last)) * dr.select(change > 0, -less / change, 1)

@@ -13,8 +13,7 @@ for the others at the collector, over whose width the shade of other clouds is a
 The peak of a phase function below five degrees is cut from the orders from 2 on, as light in the peak hardly leaves its
 way: with f the fraction of the peak and a the albedo, the density is (1 - a f) sigma_t and the albedo a (1 - f)/(1 - a
 f); single scattering has P/(1 - a f) with that density (TMS), so that nothing is counted twice. `peak=matched` takes
-the f of the phase function, `half` the printed 0.5, `full` cuts nothing: only then the sets hold the orders of the
-medium as it is.
+the f of the phase function, `full` cuts nothing: only then the sets hold the orders of the medium as it is.
 
 For each cloud, a ray shows the light that leaves at its first entry; if the ray enters the same cloud again, the slab
 of the first entry stands for both.
@@ -26,7 +25,7 @@ Bouthors, Neyret, Max, Bruneton, Crassin 2008, *Interactive multiple anisotropic
 (TMS).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -60,22 +59,20 @@ from airlight.realtime.clouds.single_scattering import (
     cloud_rays,
     light_on_surfaces,
     light_once,
-    opacity_as_printed,
     opacity_of,
     sky_behind,
 )
 from airlight.realtime.clouds.uniform_sky import SkyEscapes, beams_of, sky_escapes, sky_light
 from airlight.realtime.memory import check_memory
 from airlight.realtime.methods.interface.method import Layers, Method, View
-from airlight.realtime.numerics.array_types import types_of
+from airlight.realtime.numerics.array_types import ArrayTypes, types_of
 from airlight.realtime.numerics.recorded import Frozen
 from airlight.realtime.parameters import parameter
 from airlight.realtime.scene.media.bounded import Clouds
 from airlight.realtime.scene.mesh_adjacency import scene_of
+from airlight.realtime.scene.phase import Phase
 from airlight.realtime.scene.read_scene import Scene
 from airlight.realtime.shadow_maps.shadow_map import map_size
-
-_HALF = 0.5  #: of the density, as printed
 
 
 @dataclass(frozen=True)
@@ -85,6 +82,7 @@ class CloudCollectors(Method):
     name = "cloud-collectors"
     summary = "clouds: light of all orders from where it enters them, found by light maps and the transport of a slab"
     source = "Bouthors, Neyret, Max, Bruneton, Crassin 2008"
+    as_published = "cloud-collectors-2008"
     renders_clouds = True
     at_once = True
     prepared_from = frozenset({"geometry", "light"})
@@ -98,19 +96,10 @@ class CloudCollectors(Method):
         "a search starts at the point itself, or with the collector of the last frame",
         choices=("cold", "previous"),
     )
-    thickness: str = parameter(
-        "slab", "thickness of slabs across their faces, or along the light as printed", choices=("slab", "light")
-    )
     peak: str = parameter(
         "matched",
-        "cut the peak below 5 degrees and lower the density to match, or by half as printed; or keep the peak",
-        choices=("matched", "half", "full"),
-    )
-    single: str = parameter(
-        "corrected", "single scattering as derived, or by eq. 1 as printed", choices=("corrected", "printed")
-    )
-    opacity: str = parameter(
-        "corrected", "opacity as derived, or by eq. 2 as printed", choices=("corrected", "printed")
+        "cut the peak below 5 degrees and lower the density to match, or keep the peak",
+        choices=("matched", "full"),
     )
     sky: str = parameter(
         "uniform",
@@ -128,6 +117,23 @@ class CloudCollectors(Method):
         1.0, "longest step through a grid of densities where a ray enters", above=0, most=100, unit="voxels"
     )
     map: int = map_size(256, "texels on a side of the maps of a sun")
+
+    @property
+    def along_light(self) -> bool:
+        """Whether thickness and depth in slabs are those along the light."""
+        return False
+
+    def cut(self, phase: Phase, types: ArrayTypes) -> float:
+        """Return the fraction of the light of a phase function that is cut from its peak [1]."""
+        return fraction_of_peak(phase, types) if self.peak == "matched" else 0.0
+
+    def light_once(self, rays: CloudRays, beams: Sequence[Beam], stride: Any) -> tuple[tuple[Any, ...], ...]:
+        """Return the radiance that clouds scatter once into rays, by beam and octave, RGB [W/(m^2 sr)]."""
+        return light_once(rays, beams, steps=self.steps, stride=stride)
+
+    def opacity_along(self, rays: CloudRays, stride: Any) -> Any:
+        """Return the opacity of clouds along rays, a colour [1]."""
+        return opacity_of(rays.depths, type(rays.clouds.albedo))
 
     @property
     def carries(self):
@@ -242,7 +248,7 @@ def _fillings(scene: Scene, parameters: CloudCollectors) -> tuple[tuple[Filling,
     fillings, left = [], np.ones_like(albedos)
     for phase, albedo in sorted({(int(phase), float(value)) for row in albedos for phase, value in zip(phases, row)}):
         known = clouds.phases[phase]
-        fraction = {"matched": fraction_of_peak(known, types), "half": _HALF, "full": 0.0}[parameters.peak]
+        fraction = parameters.cut(known, types)
         filled = (phases == phase) & (albedos == albedo)
         left[filled] = 1 - albedo * fraction
         medium = (
@@ -273,7 +279,7 @@ def _collected(view: View, state: CloudState, parameters: CloudCollectors) -> La
         if state.escapes is not None and number not in suns:
             of_sky = sky_light(state.escapes, light, rays, view.visible if view.features.shadows else None)
             by_set = [sum_ + part for sum_, part in zip(by_set, of_sky)]
-    opacity = _opacity(view, state, rays, parameters)
+    opacity = parameters.opacity_along(rays, state.stride)
     layers = _with_opacity(view, state, rays, sum(by_set), opacity)
     extra = dict(zip(ORDER_LAYERS, by_set)) | {OPACITY: opacity} if view.extra_layers else None
     return replace(layers, extra=extra, carried=tuple(kept) if parameters.carries else None)
@@ -322,19 +328,8 @@ def _entry(view: View, state: CloudState, rays: CloudRays) -> _Entry:
 def _scattered_once(view: View, state: CloudState, thin_rays: CloudRays, parameters: CloudCollectors) -> Any:
     """Return order 1, a colour [W/(m^2 sr)]."""
     beams = [_beam(view, state, thin_rays.clouds, number) for number in _suns(view, parameters)]
-    once = light_once(
-        thin_rays, beams, steps=parameters.steps, stride=state.stride, printed=parameters.single == "printed"
-    )
+    once = parameters.light_once(thin_rays, beams, state.stride)
     return sum((radiance for (radiance,) in once), type(view.medium.albedo)(0))
-
-
-def _opacity(view: View, state: CloudState, rays: CloudRays, parameters: CloudCollectors) -> Any:
-    """Return the opacity, a colour."""
-    if parameters.opacity == "printed":
-        return opacity_as_printed(
-            state.surfaces, rays.clouds, view.origin, view.direction, view.distance, stride=state.stride
-        )
-    return opacity_of(rays.depths, type(view.medium.albedo))
 
 
 def _with_opacity(view: View, state: CloudState, rays: CloudRays, in_scattered: Any, opacity: Any) -> Layers:
@@ -383,7 +378,7 @@ def _many_times(
     Float, Color = type(view.distance), type(view.medium.albedo)
     search = Search(
         parameters.iterations,
-        parameters.thickness == "light",
+        parameters.along_light,
         # Where a density stays below the threshold the map has no cloud, but light passes there, too.
         covered=state.body is None,
     )

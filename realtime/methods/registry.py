@@ -25,6 +25,7 @@ _CLASSES: Mapping[str, str] = {
     "soft-shafts": "soft_shafts.method:SoftShafts",
     "shadow-planes-2006": "published.biri2006.method:ShadowPlanes2006",
     "light-volumes-2010": "published.billeter2010.method:LightVolumes2010",
+    "cloud-collectors-2008": "published.bouthors2008:CloudCollectors2008",
     "cloud-octaves": "cloud_octaves:CloudOctaves",
     "cloud-collectors": "cloud_collectors:CloudCollectors",
 }
@@ -40,7 +41,7 @@ FOG_METHODS = (
     "soft-shafts",
 )
 #: Those that have the errors of a paper, to judge it.
-PUBLISHED_METHODS = ("shadow-planes-2006", "light-volumes-2010")
+PUBLISHED_METHODS = ("shadow-planes-2006", "light-volumes-2010", "cloud-collectors-2008")
 
 
 class _Methods(Mapping[str, type[Method]]):

@@ -172,6 +172,11 @@ _KERNELS = {
     "taylor": "Biri 2006: its polynomial, wrong away from the foot point",
     "taylor-printed": "Biri 2006: its polynomial with the printed coefficients",
 }
+#: By method, where no parameter says more.
+_METHODS = {
+    "shadow-planes-2006": "Biri 2006: its stencil rule, wrong where shadows overlap",
+    "light-volumes-2010": "Billeter 2010: its mesh of a shadow map",
+}
 #: By parameter and value.
 _VALUES = {
     ("order", "paper"): "Biri 2006: its stencil rule, wrong where shadows overlap",
@@ -184,4 +189,4 @@ _VALUES = {
 def published_as(entry: CellRow) -> str:
     """Return which paper a method of report.json reproduces with its errors, and what is wrong; else nothing."""
     values = (_VALUES.get((name, str(value)), "") for name, value in json.loads(entry.parameters).items())
-    return next(filter(None, values), "") or _KERNELS.get(entry.kernel or "", "")
+    return next(filter(None, values), "") or _METHODS.get(entry.method, "") or _KERNELS.get(entry.kernel or "", "")

@@ -7,4 +7,5 @@ Read in this order:
 
 - `biri2006/`: shadow planes, drawn one by one with a stencil.
 - `billeter2010/`: light volumes as meshes, drawn triangle by triangle.
+- `bouthors2008.py`: clouds with slabs along the light, half the density, and two misprints.
 """

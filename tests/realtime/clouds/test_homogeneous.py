@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from airlight.realtime.clouds.march import cloud_surfaces, depths_along, next_crossing, segment_through
-from airlight.realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_as_printed, opacity_of
+from airlight.realtime.clouds.single_scattering import Beam, cloud_rays, light_once, opacity_of
+from airlight.realtime.methods.published.bouthors2008 import printed_opacity, printed_step
 from airlight.realtime.numerics.array_types import aligned_array
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.validation.scenes.meshes import box, placed
@@ -128,14 +129,14 @@ def device(array):
     return mi.Vector3f(*(aligned_array(mi.Float, column) for column in np.asarray(array).T))
 
 
-def marched(scene, origin, direction, *, steps, scales=(1.0,), printed=False):
+def marched(scene, origin, direction, *, steps, scales=(1.0,), integral=None):
     read = read_scene(scene)
     surfaces, clouds = cloud_surfaces(read), read.medium.clouds
     path = cloud_rays(surfaces, clouds, device(origin), device(direction), mi.Float(dr.inf), stride=None)
     segment = segment_through(surfaces, clouds, read.lights[0], stride=None)
     ones = tuple((mi.Float(1),) for _ in scales)
     beam = Beam(mi.Color3f(1), tuple(mi.Float(scale) for scale in scales), ones, segment, None)
-    (octaves,) = light_once(path, [beam], steps=steps, stride=1, printed=printed)
+    (octaves,) = light_once(path, [beam], steps=steps, stride=1, integral=integral)
     dr.eval(octaves)
     return [np.array(octave, dtype=np.float64).T for octave in octaves]
 
@@ -208,13 +209,13 @@ def test_equations_as_printed_have_the_wrong_sign(few):
     """On the slab of one step both differ from what is right by the factor -(1 + dl/dx), and by -1/kappa."""
     origin, direction, _ = few
     scene = loaded(sun=SUN, ring=cloud("ring", ring(), COLOURED))
-    (printed,) = marched(scene, origin, direction, steps=16, printed=True)
+    (printed,) = marched(scene, origin, direction, steps=16, integral=printed_step)
     (right,) = marched(scene, origin, direction, steps=16)
     assert right.min() >= 0 > printed.min()
     read = read_scene(scene)
     path = device(origin), device(direction), mi.Float(dr.inf)
     surfaces = cloud_surfaces(read)
-    length = np.array(opacity_as_printed(surfaces, read.medium.clouds, *path, stride=1)).T
+    length = np.array(printed_opacity(cloud_rays(surfaces, read.medium.clouds, *path, stride=None), 1)).T
     one_stretch = [len(crossings(ring(), *ray)[0]) <= 2 for ray in zip(origin, direction)]
     fraction = np.array(opacity(surfaces, read.medium.clouds, *path)).T
     assert length[one_stretch] == pytest.approx(-fraction[one_stretch] / SIGMA, rel=1e-4, abs=1e-4)
