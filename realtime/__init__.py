@@ -34,7 +34,8 @@ this order, as `python docs/tools/frame_path.py hall shadow-planes` lists them.
 1. `scene/read_scene.py` reads what Mitsuba loaded: `scene/camera.py`, `scene/read_media.py` and `scene/lights.py` the
    parts, and `scene/triangle_table.py` what shading needs of triangles. Arrays come from `numerics/array_types.py`.
 2. `methods/registry.py` finds the class of a name, and `methods/interface/method.py` gives it its parameters
-   (`parameters.py`), and later the view of the rays that it renders.
+   (`parameters.py`), and later the view of the rays that it renders. `methods/interface/media_checks.py` refuses media
+   that it does not render.
 3. `frame/renderer.py` groups the lights, and records the stages below once for each structure of lights, by
    `numerics/recorded.py`.
 4. `methods/shadow_planes/method.py` prepares: `scene/mesh_adjacency.py` reads how triangles hang together,

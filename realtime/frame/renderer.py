@@ -37,6 +37,7 @@ from airlight.realtime.frame.light_on_ray import check_radiance
 from airlight.realtime.frame.sphere_lights import sampled_sphere, sphere_scales
 from airlight.realtime.frame.surface import Cast, surface_stages
 from airlight.realtime.kernels.registry import Kernel
+from airlight.realtime.methods.interface.media_checks import check_media
 from airlight.realtime.methods.interface.method import Layers, Method, Preparation, camera_view, method_parameters
 from airlight.realtime.numerics.array_types import PerRay, aligned_array
 from airlight.realtime.numerics.noise import Noise, blue_mask
@@ -167,7 +168,7 @@ def frame_renderer(
     chosen, samples = method_parameters(method, parameters)
     if chosen.uses_kernel and kernel is None:
         raise InputError(f"method {method.name}: got no kernel, expected one of realtime.kernels.registry.KERNELS")
-    _check_clouds(scene, chosen)
+    check_media(scene, chosen)
     extra_layers &= not scene.area_lights
     # Groups of one structure need the same memory and are refused alike.
     lights = scene.lights + light_samples(scene, samples.points, samples.pattern)
@@ -199,51 +200,6 @@ def light_groups(scene: Scene, lights: tuple[Light, ...], method: Method, *, tog
     else:
         groups = [(light,) for light in lights]
     return tuple(LightGroup(replace(scene, lights=group)) for group in groups)
-
-
-def _check_clouds(scene: Scene, method: Method) -> None:
-    """Refuse clouds and skies where a method does not know them, and where it does what clouds cannot have."""
-    medium, name = scene.medium, method.name
-    near = [light.kind for light in scene.lights if light.w] + [f"area ({light.kind})" for light in scene.area_lights]
-    if not method.renders_clouds:
-        if medium.clouds is not None and medium.clouds.density is not None:
-            way_out = (
-                f"replace it, since no method has one with a light of kind {near[0]}"
-                if near
-                else ("use cloud-collectors or cloud-octaves")
-            )
-            raise InputError(
-                f"method {name}: the scene has a heterogeneous medium, and this method knows media of type "
-                f"'homogeneous' only; {way_out}"
-            )
-        if medium.clouds is not None and not medium.bounded_media:
-            shapes = [shape.id() for shape in scene.boundaries]
-            raise InputError(
-                f"method {name}: the bounds of the media are not all convex, and these rays cross convex bounds only "
-                f"(shapes {', '.join(map(repr, shapes[:3]))}); use cloud-collectors or cloud-octaves, or cut "
-                "the shapes into convex parts"
-            )
-        if any(light.sky is not None for light in scene.lights):
-            raise InputError(
-                f"method {name}: the scene has a sky, an emitter of type 'constant', which this method does not know; "
-                "use cloud-collectors or cloud-octaves, or remove it"
-            )
-        if medium.sums_depth and method.uses_kernel:
-            raise InputError(
-                f"method {name}: the medium is a density grid, and this method adds up integrals of lit segments, for "
-                "which no kernel knows a grid; use froxel-fog, soft-shafts, or ray-march with sum=steps"
-            )
-        return
-    if scene.medium.clouds is None:
-        raise InputError(
-            f"method {name}: the scene has no clouds; expected media with closed bounds in vacuum: give the medium "
-            "bounds, or use another method"
-        )
-    if near:
-        raise InputError(
-            f"method {name}: the scene has a light of kind {near[0]}, and clouds are lit from infinity; expected "
-            "emitters of type 'directional', and at most one 'constant': replace it or remove it"
-        )
 
 
 def _stages(scene: Scene, method: Method, *, extra_layers: bool) -> Stages:

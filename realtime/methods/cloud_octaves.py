@@ -121,7 +121,7 @@ class OctaveState:
 def _preparation(scene: Scene, parameters: CloudOctaves) -> Callable[[Scene], OctaveState]:
     """Return the function that makes the state of a frame."""
     clouds = scene.medium.clouds
-    assert clouds is not None  # `realtime.frame.renderer` refuses the others
+    assert clouds is not None  # `media_checks` refuses the others
     Float = type(scene.camera.origin.x)
     means = [mean_cosine(phase, Float) for phase in _phases(clouds, parameters, Float)]
     uniform = len(beams_of(scene.lights, parameters.sky, clouds)) < len(scene.lights)

@@ -3,7 +3,7 @@
 
 Methods that sample points march it: `extinction` is a look-up, and depths are walks from cell to cell. In a cell the
 extinction along a line is a cubic, so two nodes of Gauss are exact; that is two look-ups a cell, where engines take one
-a step. Nothing integrates a lit segment: `realtime.frame.renderer` refuses methods that ask for one.
+a step. Nothing integrates a lit segment: `realtime.methods.interface.media_checks` refuses methods that ask for one.
 """
 
 from dataclasses import dataclass, replace
