@@ -13,21 +13,21 @@ from airlight.errors import InputError, nearest
 from airlight.realtime.methods.history import ENDING, with_history
 from airlight.realtime.methods.interface.method import Method
 
-#: By name, the module in this room and the class.
-_CLASSES: Mapping[str, str] = {
-    "unshadowed": "unshadowed:Unshadowed",
-    "ray-march": "ray_march:RayMarch",
-    "equi-angular": "equi_angular:EquiAngular",
-    "shadow-planes": "shadow_planes.method:ShadowPlanes",
-    "light-volumes": "light_volumes.method:LightVolumes",
-    "min-max": "epipolar.method:MinMax",
-    "froxel-fog": "froxel_fog.method:FroxelFog",
-    "soft-shafts": "soft_shafts.method:SoftShafts",
-    "shadow-planes-2006": "published.biri2006.method:ShadowPlanes2006",
-    "light-volumes-2010": "published.billeter2010.method:LightVolumes2010",
-    "cloud-collectors-2008": "published.bouthors2008:CloudCollectors2008",
-    "cloud-octaves": "cloud_octaves:CloudOctaves",
-    "cloud-collectors": "cloud_collectors:CloudCollectors",
+#: By name, the module and the class. The key of a result counts the code of the modules that are named here in full.
+_CLASSES: Mapping[str, tuple[str, str]] = {
+    "unshadowed": ("airlight.realtime.methods.unshadowed", "Unshadowed"),
+    "ray-march": ("airlight.realtime.methods.ray_march", "RayMarch"),
+    "equi-angular": ("airlight.realtime.methods.equi_angular", "EquiAngular"),
+    "shadow-planes": ("airlight.realtime.methods.shadow_planes.method", "ShadowPlanes"),
+    "light-volumes": ("airlight.realtime.methods.light_volumes.method", "LightVolumes"),
+    "min-max": ("airlight.realtime.methods.epipolar.method", "MinMax"),
+    "froxel-fog": ("airlight.realtime.methods.froxel_fog.method", "FroxelFog"),
+    "soft-shafts": ("airlight.realtime.methods.soft_shafts.method", "SoftShafts"),
+    "shadow-planes-2006": ("airlight.realtime.methods.published.biri2006.method", "ShadowPlanes2006"),
+    "light-volumes-2010": ("airlight.realtime.methods.published.billeter2010.method", "LightVolumes2010"),
+    "cloud-collectors-2008": ("airlight.realtime.methods.published.bouthors2008", "CloudCollectors2008"),
+    "cloud-octaves": ("airlight.realtime.methods.cloud_octaves", "CloudOctaves"),
+    "cloud-collectors": ("airlight.realtime.methods.cloud_collectors", "CloudCollectors"),
 }
 
 #: Those of light that is scattered once, in any scene, without random numbers by default.
@@ -46,8 +46,8 @@ PUBLISHED_METHODS = ("shadow-planes-2006", "light-volumes-2010", "cloud-collecto
 
 class _Methods(Mapping[str, type[Method]]):
     def __getitem__(self, name: str) -> type[Method]:
-        module, _, found = _CLASSES[name].partition(":")
-        method: type[Method] = getattr(import_module(f"airlight.realtime.methods.{module}"), found)
+        module, found = _CLASSES[name]
+        method: type[Method] = getattr(import_module(module), found)
         return method
 
     def __iter__(self) -> Iterator[str]:

@@ -68,9 +68,18 @@ def _compiled(path: Path, changed: int) -> tuple[bytes, frozenset[str]]:
 
 def _bare(code: CodeType, names: set[str]) -> CodeType:
     """Return code without its places in the file, and add the names and the words that it mentions."""
-    names.update(code.co_names, (each for each in code.co_consts if isinstance(each, str)))
+    names.update(code.co_names, _words(code.co_consts))
     constants = tuple(_bare(each, names) if isinstance(each, CodeType) else each for each in code.co_consts)
     return code.replace(co_consts=constants, co_filename="", co_firstlineno=1, co_linetable=b"")
+
+
+def _words(constants: Iterable[object]) -> Iterator[str]:
+    """Yield the words among constants, those in tuples and sets too: a registry may name modules by them."""
+    for each in constants:
+        if isinstance(each, str):
+            yield each
+        elif isinstance(each, tuple | frozenset):
+            yield from _words(each)
 
 
 def _imported(path: Path, names: Iterable[str]) -> Iterator[Path]:
