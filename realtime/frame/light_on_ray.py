@@ -48,11 +48,12 @@ def check_radiance(scene: Scene, name: str, airlight: Any, surface: Any, distanc
         wrong = ~np.isfinite(values).all(axis=2)
         if wrong.any():
             row, column = np.argwhere(wrong)[0]
+            medium = scene.medium.summary.partition(":")[0]
             raise InputError(
                 f"method {name}: the {what} of {int(wrong.sum())} of {wrong.size} pixels is not finite, first in "
                 f"column {column} of row {row}: {', '.join(f'{value:g}' for value in values[row, column])}; a light "
-                "may lie on its ray, a segment of it need more panels than the medium tries, or a number of the scene "
-                "be too large for float32: move the light, or use other units"
+                f"may lie on its ray, a segment of it need more panels than the medium ({medium}) tries, or a number "
+                "of the scene be too large for float32: move the light, or use other units"
             )
 
 

@@ -61,6 +61,10 @@ class Phase:
         """Return the widest panel in v, for arrays of a type."""
         return Float(self.reach.panel)
 
+    def width(self, Float) -> Any:
+        """Return the widest panel in ln E (`realtime.scene.media.integrate`), for arrays of a type."""
+        return Float(self.reach.width)
+
     def lobe_scales(self, Float) -> tuple[Any, Any]:
         """Return the E where a forward lobe ends, at most 1, and the E where a backward lobe begins, at least 1."""
         return Float(self.scale), 1.0

@@ -27,8 +27,6 @@ from airlight.realtime.scene.directional_extent import (
     shape_spheres,
 )
 from airlight.realtime.scene.lights import Light, spot_fields
-from airlight.realtime.scene.media.density_grid import GridMedium
-from airlight.realtime.scene.media.height_fog import HeightFog
 from airlight.realtime.scene.media.medium import Medium
 from airlight.realtime.scene.read_media import opaque_scene, read_medium, sort_shapes
 from airlight.realtime.scene.rounding import rounding_notes
@@ -185,19 +183,8 @@ def _read_light(emitter, types: ArrayTypes) -> Light:
 
 
 def _read_directional(emitter, bodies: _Bodies, types: ArrayTypes) -> Light:
-    medium = bodies.medium
     axis = beam_axis(emitter)
-    if isinstance(medium, HeightFog):
-        if not axis @ np.array(medium.up, dtype=np.float64).ravel() < 0:
-            raise InputError(
-                f"light '{emitter.id()}' is directional and shines from the horizon or below: each of its light paths "
-                "through height fog, which has no sides, is infinitely deep; expected a light from above the horizon"
-            )
-    elif not (isinstance(medium, GridMedium) or (medium.clear and medium.clouds)):
-        raise InputError(
-            "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
-            "infinity: needs media with bounds in vacuum; give the medium bounds, or use a 'point' or 'spot' light"
-        )
+    bodies.medium.check_beam(axis, emitter.id())
     parameters = mi.traverse(emitter)
     if "irradiance.value" not in parameters:
         raise InputError("the directional light has a textured or spectral irradiance; expected a constant 'rgb' one")

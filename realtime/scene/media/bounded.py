@@ -46,6 +46,11 @@ class BoundedMedia(Homogeneous):
     clear: bool = False
     clouds: Clouds | None = None
 
+    def check_beam(self, axis, name):
+        """Refuse light through a medium around the bounded ones."""
+        if not (self.clear and self.clouds):
+            super().check_beam(axis, name)
+
     @property
     def summary(self):
         """Clouds where not all bounds are convex or not all media homogeneous."""

@@ -12,21 +12,11 @@ medium k (`realtime.scene.media.light_paths`), and
 
     tau_light = sigma_0 r + sum_k (sigma_k - sigma_0) l_k,        sigma_0 = 0 in vacuum.
 
-Between two *bends*, where a path passes from facet to facet, or an edge, or grazes a sphere, or where the intensity of
-a spot begins to fall, all of this is smooth. A panel ends at a bend, and sooner where it would
+Between two *bends*, where a path passes from facet to facet, or an edge, or grazes a sphere, all of this is smooth. The
+panels of `realtime.scene.media.integrate` end at a bend, and sooner where they would
 
-* turn by more than some angle about the light, which depends on the phase function (`realtime.scene.rule_reach`),
 * be optically thicker than some depth, both paths together,
 * change 1 + e by more than some fraction of it: the length rises steeply where a path grazes its facet.
-
-In a panel of n nodes the rule of Gauss and Legendre is used in t from 0 to 1 with the tangent of the angle at the light
-from the panel's beginning linear in t: with the ends s_0 and s_1 from the foot, h the height and D = h^2 + s_0 s_1,
-
-    s = ((1 - t) D s_0 + t r_0^2 s_1)/((1 - t) D + t r_0^2),      dx/r^2 = (s_1 - s_0)/D dt/(1 + t^2 T^2),
-
-T = h (s_1 - s_0)/D. All terms are of one sign, and nothing divides by h: a segment far from the light or a ray close to
-it loses nothing. The largest angle, of tangent T, ends at s_0 + T r_0^2/(h - T s_0), nowhere where that is behind.
-For a light at infinity t is linear in x.
 """
 
 from dataclasses import dataclass
@@ -37,16 +27,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from airlight.realtime.numerics.array_types import is_single
-from airlight.realtime.numerics.functions import exp_bounded, unit_nodes
+from airlight.realtime.numerics.functions import exp_bounded
+from airlight.realtime.scene.media.integrate import Node, Start, integral
 from airlight.realtime.scene.media.light_paths import Envelopes, LightPaths, beyond, paths_from
-from airlight.realtime.scene.media.medium import Homogeneous, LitRays, Rays, optical_reach, unfinished
-from airlight.realtime.scene.rule_reach import TANGENT, TURN_DEPTH, TURN_NODES, angle_scale
+from airlight.realtime.scene.media.medium import Homogeneous, LitRays, Rays, optical_reach
+from airlight.realtime.scene.rule_reach import CHANGE
 
-_NODES_DOUBLE = 6
 _MOST = 1000  # panels of a segment beside those that end where a path passes from facet to facet
-_DEPTH_DOUBLE = 1.6
-_NEARER, _FARTHER = 0.5, 0.8
 
 
 @dataclass(frozen=True)
@@ -86,7 +73,10 @@ class BoundedRays(LitRays):
     def integral(self, piece: Piece, x0, x1):
         """Return albedo sigma J over a segment [m] in one piece, a colour [1/m^2]."""
         x1 = dr.minimum(x1, x0 + optical_reach(type(x0)) / piece.medium.least_extinction())
-        return _panels(self, piece, x0, x1, self.light_paths(piece, x0, x1))
+        paths = tuple(self.light_paths(piece, x0, x1))
+        lit = PieceRays(self.medium, self.light, self.rays, self.geometry, None, self, piece, paths)
+        sums = zip(piece.medium.sigma_t, integral(lit, x0, x1), strict=True)
+        return piece.medium.albedo * type(piece.medium.albedo)(*(sigma * total for sigma, total in sums))
 
     def light_paths(self, piece: Piece, x0, x1) -> list[LightPaths]:
         """Return the paths from the light to a segment [m] in one piece, through each medium that they may meet."""
@@ -112,17 +102,74 @@ class BoundedRays(LitRays):
             depths.append(depth)
         return depths
 
-    def distance_to_light(self, x):
-        """Return r at a distance x of the rays [m]; 1 for a light at infinity."""
-        if not self.light.w:
-            return type(x)(1)
-        s = x - self.geometry.foot
-        return dr.sqrt(dr.fma(s, s, dr.square(self.height)))
-
     @property
     def height(self):
         """The height [m]; a ray through the light has an infinite integral, and so nearly is its value."""
         return dr.maximum(self.geometry.height, 1e-15)
+
+
+@dataclass(frozen=True)
+class PieceRays(LitRays):
+    """Rays in one piece: values are p exp(-tau) by channel, the state is the envelopes of the light's paths."""
+
+    whole: Any = None  #: `BoundedRays`
+    piece: Any = None  #: `Piece`
+    paths: tuple[LightPaths, ...] = ()
+
+    @property
+    def most_panels(self):
+        """Some, and two for each facet: a path enters and leaves each facet of a convex body once."""
+        return _MOST + 2 * sum(path.bounded.count for path in self.paths)
+
+    @property
+    def phase(self):
+        """The phase function of the piece."""
+        return self.piece.medium.phase
+
+    def bends(self):
+        """Return where paths graze spheres [m]."""
+        return tuple(x for path in self.paths for x in path.grazed_at())
+
+    def zeros(self, width):
+        """Return nothing by channel."""
+        return [dr.zeros(type(self.geometry.height), width) for _ in self.piece.before]
+
+    def begin(self, x):
+        """Return the envelopes at x [m]."""
+        return [path.envelopes_at(beyond(x)) for path in self.paths]
+
+    def shines(self, envelopes):
+        """Return true: segments end where nothing is left."""
+        return mi.Bool(True)
+
+    def panel(self, start: Start, envelopes):
+        """Return the ends of panels, p exp(-tau) by channel at nodes, and the envelopes behind the panels."""
+        x, end = start.x, start.end(self._rate(start, envelopes))
+        # The next place at which a facet takes over, or a path passes an edge: beyond a rounding error of x.
+        at = beyond(x)
+        changes = [own and path.next_change(own, at) for path, own in zip(self.paths, envelopes)]
+        for own, change in zip(envelopes, changes):
+            if own:
+                bend = dr.minimum(dr.maximum(dr.minimum(*change[0]), at), own.crossing(at))
+                end = dr.minimum(end, bend - start.foot)
+
+        def values(node: Node):
+            lengths = [
+                (path.bounded.medium, path.length(own, node.x, node.r)) for path, own in zip(self.paths, envelopes)
+            ]
+            phase = self.phase.evaluate_half(node.down, node.up)
+            return [phase * exp_bounded(-depth) for depth in self.whole.depths(self.piece, node.x, node.r, lengths)]
+
+        return end, values, [own and _after(own, change, start.foot + end) for own, change in zip(envelopes, changes)]
+
+    def _rate(self, start: Start, envelopes):
+        """Return the reciprocal of the longest panels [1/m]."""
+        rate, bending = self.whole.growth(self.piece, start.x, start.r), type(start.s)(0)
+        for path, own in zip(self.paths, envelopes):
+            steepness, smooth = path.steepness(own, start.x, start.r)
+            rate = rate + steepness * reduce(dr.maximum, path.bounded.medium.sigma_t)
+            bending = dr.maximum(bending, 1 / smooth)
+        return dr.maximum(rate * (1 / CHANGE), bending)
 
 
 def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
@@ -150,49 +197,6 @@ def camera_pieces(medium: Any, rays: Rays) -> tuple[Piece, ...]:
     return tuple(pieces)
 
 
-def _panels(ray: BoundedRays, piece: Piece, x0, x1, paths: list[LightPaths]):
-    """Sum the panels of a segment whose light paths meet none but the media of `paths`."""
-    Float, Color = type(x0), type(ray.medium.albedo)
-    bends = [x for path in paths for x in path.grazed_at()]
-    if ray.light.varies:
-        bends += [end for _, end in ray.geometry.smooth_subsegments(ray.light, x0, x1)]
-
-    def panel(turn, x, envelopes, totals):
-        at = beyond(x)
-        changes = [own and path.next_change(own, at) for path, own in zip(paths, envelopes)]
-        until = x1
-        for bend in bends:
-            until = dr.minimum(until, dr.select(bend > at, bend, dr.inf))
-        for own, change in zip(envelopes, changes):
-            if own:
-                until = dr.minimum(until, dr.maximum(dr.minimum(*change[0]), at))
-                until = dr.minimum(until, own.crossing(at))
-        length = until - x
-        count = dr.ceil(length / _longest(ray, piece, paths, envelopes, x))
-        end = dr.select(count > 1, x + length / count, until)
-        totals = [total + part for total, part in zip(totals, _panel(ray, piece, paths, envelopes, x, end))]
-        envelopes = [own and _after(own, change, end) for own, change in zip(envelopes, changes)]
-        return turn + 1, end, envelopes, totals
-
-    # A path enters and leaves each facet of a convex body once, and there are two of them.
-    most = _MOST + 2 * sum(path.bounded.count for path in paths)
-    width = dr.width(ray.geometry.height, x0, x1)
-    x0 = x0 + dr.zeros(Float, width)
-    _, reached, _, totals = dr.while_loop(
-        state=(
-            dr.zeros(mi.UInt32, width),
-            x0,
-            [path.envelopes_at(beyond(x0)) for path in paths],
-            [dr.zeros(Float, width) for _ in piece.before],
-        ),
-        cond=lambda turn, x, envelopes, totals: (x < x1) & (turn < most),
-        body=panel,
-        labels=("turn", "x", "envelopes", "totals"),
-    )
-    totals = [unfinished(reached < x1, total) for total in totals]
-    return piece.medium.albedo * Color(*(sigma * total for sigma, total in zip(piece.medium.sigma_t, totals)))
-
-
 def _after(own: Envelopes, change, x) -> Envelopes:
     """Return the envelopes from x on, a distance not beyond the next change of either [m]."""
     (until_low, until_high), after = change
@@ -204,58 +208,3 @@ def _after(own: Envelopes, change, x) -> Envelopes:
             dr.select(until_high <= x, after.planes[1], own.planes[1]),
         ),
     )
-
-
-def _longest(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x):
-    """Return the length of the longest panel that begins at x [m]."""
-    r, h = ray.distance_to_light(x), ray.height
-    longest, rate = type(x)(dr.inf), ray.growth(piece, x, r)
-    if ray.light.w:
-        s = x - ray.geometry.foot
-        phase, e = piece.medium.phase, dr.select(s > 0, r + s, h) / dr.select(s > 0, h, r - s)
-        tangent = dr.minimum(
-            TANGENT, phase.reach.turn * angle_scale(dr.minimum(e, 1e9), *phase.lobe_scales(type(x)), dr.sqrt)
-        )
-        if ray.light.varies:
-            tangent = dr.minimum(tangent, 0.4 * TANGENT)
-        turning = h - tangent * s
-        longest = dr.select(turning > 0, tangent * dr.square(r) / turning, dr.inf)
-        longest = dr.minimum(longest, dr.select(s < 0, _NEARER, _FARTHER) * r)
-    for path, own in zip(paths, envelopes):
-        steepness, smooth = path.steepness(own, x, r)
-        rate = rate + steepness * reduce(dr.maximum, path.bounded.medium.sigma_t)
-        longest = dr.minimum(longest, smooth)
-    return dr.minimum(longest, (TURN_DEPTH if is_single(type(x)) else _DEPTH_DOUBLE) / rate)
-
-
-def _panel(ray: BoundedRays, piece: Piece, paths: list[LightPaths], envelopes, x0, x1) -> list[Any]:
-    """Return the integrals of p exp(-tau) / r^2 over a panel, by channel."""
-    Float, w = type(x0), ray.light.w
-    length = scale = x1 - x0
-    if w:
-        h, s0, s1 = ray.height, x0 - ray.geometry.foot, x1 - ray.geometry.foot
-        square0, square1 = dr.fma(s0, s0, h * h), dr.fma(s1, s1, h * h)
-        # A panel turns by less than 31 degrees, so a smaller product is the work of rounding.
-        product = dr.maximum(dr.fma(s0, s1, h * h), 0.5 * dr.sqrt(square0 * square1))
-        scale = length / product
-        tangent = dr.square(h * scale)
-    totals = [Float(0) for _ in piece.before]
-    for t, weight in unit_nodes(TURN_NODES if is_single(Float) else _NODES_DOUBLE):
-        if w:
-            far = t * square0
-            s = dr.fma(length, far / dr.fma(1 - t, product, far), s0)
-            x, r = s + ray.geometry.foot, dr.sqrt(dr.fma(s, s, h * h))
-            fraction = weight / dr.fma(t * t, tangent, 1)
-        else:
-            x, r, fraction = dr.fma(t, length, x0), Float(1), weight
-        fraction = fraction * _scattered(ray, piece, x, r)
-        lengths = [(path.bounded.medium, path.length(own, x, r)) for path, own in zip(paths, envelopes)]
-        for channel, depth in enumerate(ray.depths(piece, x, r, lengths)):
-            totals[channel] += fraction * exp_bounded(-depth)
-    return [scale * total for total in totals]
-
-
-def _scattered(ray: BoundedRays, piece: Piece, x, r):
-    """Return the phase function times the spot's profile [1]."""
-    phase = ray.angle(x - ray.geometry.foot, r)(piece.medium.phase)
-    return phase * ray.geometry.falloff(ray.light, x) if ray.light.varies else phase

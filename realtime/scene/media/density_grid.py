@@ -79,6 +79,10 @@ class GridMedium(VaryingMedium):
         _, total = dr.while_loop((zero, zero), lambda x, _: x < length, walk, labels=("x", "total"))
         return (self.largest * total,)
 
+    def longest(self, rays, light, x, change):
+        """Return the width of a voxel: the extinction has a kink at each [m]."""
+        return self.density.voxel
+
     def part(self, rays, x0, x1, *, uniform):
         """Return the part of a segment in the box [m]."""
         begin, end = (dr.clip(x, *rays.crossed) for x in (x0, x1))

@@ -17,40 +17,30 @@ by sigma_t (1 - dz/mu) along a ray, whatever the layers. Over a lit segment of t
 
 (plane-parallel single scattering, Chandrasekhar 1960). It costs two optical depths and no node.
 
-**Lights at places.** With s = x - foot, the height h and distance r of the light, N^2 = (r + s)/2 and D^2 = (r - s)/2,
-2 N D is h. At E = N/D = (r + s)/h there is s/r = (E^2 - 1)/(E^2 + 1), E^2/(1 + E^2) and 1/(1 + E^2) are sin^2 and
-cos^2 of half the scattering angle, and dx/r^2 = (2/h) dE/(1 + E^2). In a panel N and D are linear in t from 0 to 1,
-with C = N0 N1 + D0 D1, and
-
-    s - s0 = t h (s1 - s0)/(2 C) (N N0 + D D0)/(N D),    r = h (N^2 + D^2)/(2 N D),
-    dx/r^2 = (s1 - s0)/C dt/(N^2 + D^2).
-
-Nothing cancels or divides by h, and there is no function but the reciprocal. In the middle E is the geometric mean of
-the ends', and about exponential in t throughout; by w = ln E the light and the lobe of Henyey and Greenstein lie at
-|Im w| = pi/2, whatever g is. A panel may be so wide in w, or rise by so many scale heights or change either depth by so
-much, and less of each if they come together. It begins at its lower end: there a node has one exponential for each
-layer, e^-u - 1, for the density and for the depth from the camera; the depth to the light takes the density at both its
-ends. Panels end at the bases of clamped layers and at kinks of spots.
+**Lights at places.** A panel (`realtime.scene.media.integrate`) is computed from its lower end: there a node has one
+exponential for each layer, e^-u - 1, for the density and for the depth from the camera; the depth to the light takes
+the density at both its ends. Panels end at the bases of clamped layers. Beyond a base the mean density of the way to a
+light goes like 1/(z - z_light), a panel's limit there; a layer that falls is a fraction of the density, and its fourth
+root counts, since the rule leaves about the fourth power of what it does not resolve.
 """
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
+import numpy as np
 
 from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import is_single
-from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded, unit_nodes
-from airlight.realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach, unfinished
+from airlight.realtime.numerics.functions import exp_bounded, exp_expm1_bounded
+from airlight.realtime.scene.media.integrate import Node, Start
+from airlight.realtime.scene.media.medium import LitRays, VaryingMedium, optical_reach
 from airlight.realtime.scene.phase import Phase
+from airlight.realtime.scene.rule_reach import CHANGE
 
-_NODES, _NODES_DOUBLE = 12, 28
-_WIDTH, _SCALE_HEIGHTS, _DEPTH = 4.2, 10.0, 12.0  # of a panel at most: in ln E, of rise, of optical depth
 _WIDTH_ASKED = 6.0  # in ln E of panels with a number of nodes that was asked for
-_MOST = 200  # panels of a segment: a frame whose segments need more is refused
 _UNBOUNDED = 1e9  # [m]
+_AT_BASE = 1e-4  # of a scale height beside a base: panels that begin at it
 _LEVEL = 1e-20  # the rise of a ray, and a difference of heights [m], that stand for none
 
 
@@ -76,6 +66,14 @@ class HeightFog(VaryingMedium):
     albedo: Any
     phase: Phase
     summary = "height fog: depths and suns in closed form, panels of nodes for lights at places"
+
+    def check_beam(self, axis, name):
+        """Refuse light from the horizon or below."""
+        if not axis @ np.array(self.up, dtype=np.float64).ravel() < 0:
+            raise InputError(
+                f"light '{name}' is directional and shines from the horizon or below: each of its light paths "
+                "through height fog, which has no sides, is infinitely deep; expected a light from above the horizon"
+            )
 
     def rays(self, origin, direction, aim=None):
         """Return rays with the distances between which they are in the fog [m], and their heights and rise."""
@@ -109,6 +107,44 @@ class HeightFog(VaryingMedium):
         if not getattr(light, "w", 1):
             return (self._overhead(z) / -dr.dot(light.axis, self.up),)
         return (self._between(z, dr.dot(light.position, self.up), r),)
+
+    def bends(self, rays, light):
+        """Return where rays pass the bases of clamped layers [m]."""
+        _, (start, rise) = rays.crossed
+        return tuple((layer.base - start) / rise for layer in self.layers) if self.clamped else ()
+
+    def longest(self, rays, light, x, change):
+        """Return a length in which depths and the logarithm of the density change by no more than a number [m]."""
+        (_, (start, rise)), end = rays.crossed, self._end(light)
+        z = dr.fma(rise, x, start)
+        whole, part, low = self._to_light(z, light, end)
+        r = dr.norm(light.position - rays.at(x))
+        # The density here, its integral over the heights up to the light, and what changes behind a base.
+        density, column, behind = self.constant, self.constant * part, type(x)(0)
+        extinctions = []
+        for layer in self.layers:
+            here = self._fall(layer, z)
+            of_layer = self._column(layer, low, part, (here, self._fall(layer, end)))
+            extinctions.append(layer.sigma_t * here)
+            density, column = density + extinctions[-1], dr.fma(layer.sigma_t, of_layer, column)
+            if self.clamped:
+                # A panel may begin at the base itself, rounded.
+                above = end - layer.base
+                crossed = (z - layer.base) * above < _AT_BASE * layer.scale_height * dr.abs(above)
+                changes = r * layer.sigma_t * dr.abs(here - of_layer / part)
+                behind = dr.maximum(behind, dr.select(crossed, _root(changes), 0))
+        # Upwards a layer counts by its fraction of the density; downwards any can become the largest.
+        up, down = type(x)(0), type(x)(0)
+        for layer, extinction in zip(self.layers, extinctions, strict=True):
+            steep = dr.rcp(layer.scale_height)
+            up = dr.fma(steep, _root(extinction * dr.rcp(dr.maximum(density, 1e-30))), up)
+            down = dr.maximum(down, steep)
+        steep = dr.abs(rise) * dr.select(rise > 0, up, down)
+        thick = density + column * dr.rcp(whole)
+        # Downwards depths grow as exponentials of the way, by `change` after log(1 + change steep/thick)/steep.
+        grown = change * steep * dr.rcp(thick)
+        thick = dr.select((rise < 0) & (grown > 1e-2), change * steep / dr.log(1 + grown), thick)
+        return change / (thick + steep + dr.abs(rise) * (behind * dr.rcp(whole)))
 
     def length_from(self, rays, x, depth: float):
         """Return a length after x [m] in which the optical depth grows by `depth` or more; infinite: it does not."""
@@ -155,6 +191,15 @@ class HeightFog(VaryingMedium):
                 "nodes, in height fog"
             )
         return HeightRays(self, light, rays, geometry, kernel, nodes)
+
+    def _end(self, light):
+        """Return the height of a light, or where the fog ends before it [m]."""
+        return dr.clip(dr.dot(light.position, self.up), self.floor, self.cap)
+
+    def _to_light(self, z, light, end):
+        """Return how far a light is from heights upwards, how far within the fog, and the lower end of that [m]."""
+        whole, part = (dr.maximum(dr.abs(other - z), _LEVEL) for other in (dr.dot(light.position, self.up), end))
+        return whole, part, dr.minimum(z, end)
 
     def _fall(self, layer: Layer, z):
         # A quotient to its last digit by the reciprocal, which is the same everywhere.
@@ -208,21 +253,19 @@ class HeightFog(VaryingMedium):
 class HeightRays(LitRays):
     """Rays in height fog with one light: integrals are RGB [1/m^2], of suns [1]."""
 
-    nodes: int | None = None  #: of each panel, which then ends at the foot, too; None: as many as float32 needs
-
-    @property
-    def end(self):
-        """The height of the light, or where the fog ends before it [m]."""
-        return dr.clip(dr.dot(self.light.position, self.medium.up), self.medium.floor, self.medium.cap)
+    nodes_asked: int | None = None  #: of each panel, which then ends at the foot, too; None: as many as it needs
 
     def airlight(self, x0, x1):
         """Return the integral over lit segments [x0, x1] [m]."""
-        medium, (enter, leave) = self.medium, self.rays.crossed[0]
-        x0, x1 = self.geometry.lit_segment(x0, x1)
-        x0, x1 = dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
-        if not self.light.w:
-            return medium.albedo * dr.select(x1 > x0, self._sun(x0, x1), 0)
-        return medium.albedo * dr.select(x1 > x0, self._panels(x0, x1), 0)
+        if self.light.w:
+            return super().airlight(x0, x1)
+        x0, x1 = self.within(*self.geometry.lit_segment(x0, x1))
+        return self.medium.albedo * dr.select(x1 > x0, self._sun(x0, x1), 0)
+
+    def within(self, x0, x1):
+        """Return the part of segments between floor and cap [m]: the light's path may lose as the camera's gains."""
+        enter, leave = self.rays.crossed[0]
+        return dr.clip(x0, enter, leave), dr.clip(x1, enter, leave)
 
     def _sun(self, x0, x1):
         medium, (start, rise) = self.medium, self.rays.crossed[1]
@@ -233,75 +276,38 @@ class HeightRays(LitRays):
         exponent = medium.optical_depth(self.rays, 0, x)[0] + medium._overhead(dr.fma(rise, x, start)) / mu
         return exp_bounded(-exponent) * tau * phi(dr.abs(q)) * self.angle(None, None)(medium.phase)
 
-    def _panels(self, x0, x1):
-        """Sum panels of a segment."""
-        Float, medium, (start, rise) = type(x0), self.medium, self.rays.crossed[1]
-        width = dr.width(self.geometry.height, x0, x1)
-        bends = [end for _, end in self.geometry.smooth_subsegments(self.light, x0, x1)[:-1]]
-        if medium.clamped:
-            bends += [(layer.base - start) / rise for layer in medium.layers]
-        (before,) = medium.optical_depth(self.rays, 0, x0)
-        # Twice the usual reach: out of thick fog the way to the light may lose more depth than the camera's gains.
-        reach = 2 * optical_reach(Float)
-        deepest = before + reach
-        if self.nodes is not None:
-            bends.append(self.geometry.foot)
-            x1 = dr.minimum(x1, x0 + medium.length_from(self.rays, x0, reach))
+    def nodes(self, Float):
+        """Return the number that was asked for, otherwise the usual one."""
+        return self.nodes_asked or super().nodes(Float)
 
-        def panel(turn, x, depth, total):
-            end = dr.minimum(x + self._longest(x), x1)
-            for bend in bends:
-                end = dr.minimum(end, dr.select(bend > x, bend, dr.inf))
-            part, depth = self._panel(x, end, depth)
-            return turn + 1, end, depth, total + part
+    def panel_width(self, Float):
+        """Return the width of panels with the nodes that were asked for, otherwise the usual one."""
+        return Float(_WIDTH_ASKED) if self.nodes_asked else super().panel_width(Float)
 
-        _, reached, depth, total = dr.while_loop(
-            state=(dr.zeros(mi.UInt32, width), x0 + dr.zeros(Float, width), before, dr.zeros(Float, width)),
-            cond=lambda turn, x, depth, total: (x < x1) & (depth < deepest) & (turn < _MOST),
-            body=panel,
-            labels=("turn", "x", "depth", "total"),
-        )
-        return unfinished((reached < x1) & (depth < deepest), total)
+    def bends(self):
+        """Return the bends of the fog; panels with nodes that were asked for end at the foot, too."""
+        return (*super().bends(), self.geometry.foot) if self.nodes_asked else super().bends()
 
-    def _longest(self, x):
-        """Return the length of the longest panel that begins at x [m]."""
-        medium, (start, rise) = self.medium, self.rays.crossed[1]
-        s = x - self.geometry.foot
-        r = dr.sqrt(dr.fma(s, s, dr.square(self.geometry.height)))
-        width = _WIDTH if self.nodes is None else _WIDTH_ASKED
-        longest = dr.fma(math.cosh(width) - 1, s, math.sinh(width) * r)
-        if self.nodes is not None:
-            return longest
-        z = dr.fma(rise, x, start)
-        whole, part, low = self._to_light(z)
-        density, segment, falling, steepest = medium.constant, medium.constant * part, 0, 0
-        for layer in medium.layers:
-            here, steep = medium._fall(layer, z), dr.rcp(layer.scale_height)
-            own = layer.sigma_t * here
-            density, falling, steepest = density + own, dr.fma(own, steep, falling), dr.maximum(steepest, steep)
-            segment = dr.fma(
-                layer.sigma_t, medium._column(layer, low, part, (here, medium._fall(layer, self.end))), segment
-            )
-        # Upwards the layers by their share in the density; downwards, where it grows, any can become the largest.
-        steep = rise * dr.select(rise > 0, falling * dr.rcp(dr.maximum(density, 1e-30)), steepest)
-        thick = dr.maximum(dr.fma(-0.5 * _DEPTH, dr.minimum(steep, 0), density), segment * dr.rcp(whole))
-        rate = dr.maximum((1 / _DEPTH) * thick, (1 / _SCALE_HEIGHTS) * dr.abs(steep))
-        return longest * dr.rsqrt(dr.fma(longest * rate, longest * rate, 1))
+    def sum(self, totals):
+        """Return the albedo times the sum of panels."""
+        return self.medium.albedo * totals[0]
 
-    def _to_light(self, z):
-        """Return how far the light is from heights upwards, how far within the fog, and the lower end of that [m]."""
-        ends = dr.dot(self.light.position, self.medium.up), self.end
-        whole, part = (dr.maximum(dr.abs(end - z), _LEVEL) for end in ends)
-        return whole, part, dr.minimum(z, self.end)
+    def zeros(self, width):
+        """Return one number: the fog is grey."""
+        return [dr.zeros(type(self.geometry.height), width)]
 
-    def _panel(self, x0, x1, before):
-        """Integrate one panel, to whose beginning the optical depth is `before`; return that to its end, too."""
-        Float, medium, (start, slope) = type(x0), self.medium, self.rays.crossed[1]
-        foot, h, length = self.geometry.foot, dr.maximum(self.geometry.height, 1e-12), x1 - x0
+    def panel(self, start: Start, depths):
+        """Return the ends of panels, the density times p exp(-tau) at nodes, and the depths behind the panels."""
+        (before,), medium, light = depths, self.medium, self.light
+        Float, (origin, slope) = type(before), self.rays.crossed[1]
+        rate = Float(0) if self.nodes_asked else 1 / medium.longest(self.rays, light, start.x, CHANGE)
+        end = start.end(rate)
+        length, x1 = end - start.s, start.foot + end
+
+        # The density of each layer at the lower end, and its part of the depth of the panel.
         up, rise = slope > 0, dr.abs(slope)
-        low, high = dr.select(up, x0, x1), dr.select(up, x1, x0)
-        z_low = dr.fma(slope, low, start)
-        across, layers = medium.constant * length, []
+        z_low = dr.fma(slope, dr.select(up, start.x, x1), origin)
+        across, layers, at_light = medium.constant * length, [], medium._end(light)
         for layer in medium.layers:
             steep = dr.maximum(rise / layer.scale_height, 1e-12)
             if medium.clamped:
@@ -309,40 +315,29 @@ class HeightRays(LitRays):
             at_low = medium._fall(layer, z_low)
             along = -at_low / steep
             across = dr.fma(layer.sigma_t * along, exp_expm1_bounded(-steep * length)[1], across)
-            layers.append((layer, steep, at_low, along, medium._fall(layer, self.end)))
+            layers.append((layer, steep, at_low, along, medium._fall(layer, at_light)))
         after = before + across
-        at_lowest, sign = dr.select(up, before, after), dr.select(up, Float(1), -1)
-        (n0, d0), (n1, d1) = _roots(low - foot, h), _roots(high - foot, h)
-        fraction = length / dr.fma(n0, n1, d0 * d1)
-        total = Float(0)
-        for t, weight in unit_nodes(self.nodes or (_NODES if is_single(Float) else _NODES_DOUBLE)):
-            n, d = dr.fma(n1 - n0, t, n0), dr.fma(d1 - d0, t, d0)
-            square_n, square_d = dr.square(n), dr.square(d)
-            inverse, scale = dr.rcp(square_n + square_d), 0.5 * h * dr.rcp(n * d)
-            far, r = fraction * t * (dr.fma(n, n0, d * d0) * scale), (square_n + square_d) * scale
-            whole, part, lower = self._to_light(dr.fma(rise, far, z_low))
+        lowest, sign = dr.select(up, before, after), dr.select(up, Float(1), -1)
+
+        def values(node: Node):
+            far = dr.select(up, node.far, node.rest)
+            whole, part, lower = medium._to_light(dr.fma(rise, far, z_low), light, at_light)
             density, camera, segment = medium.constant, medium.constant * far, medium.constant * part
             for layer, steep, at_low, along, at_end in layers:
-                kept, less = exp_expm1_bounded(-steep * far)
-                here = at_low * kept
+                fraction, less = exp_expm1_bounded(-steep * far)
+                here = at_low * fraction
                 density = dr.fma(layer.sigma_t, here, density)
                 camera = dr.fma(layer.sigma_t * along, less, camera)
                 segment = dr.fma(layer.sigma_t, medium._column(layer, lower, part, (here, at_end)), segment)
-            exponent = dr.fma(sign, camera, at_lowest) + r * (segment * dr.rcp(whole))
-            value = weight * inverse * density * exp_bounded(-exponent)
-            if not medium.phase.constant:
-                value *= medium.phase.evaluate_half(square_n * inverse, square_d * inverse)
-            if self.light.varies:
-                value *= self.geometry.falloff_beside(self.light, (square_n - square_d) * scale)
-            total += value
-        return dr.select(x1 > x0, total * fraction, 0), after
+            exponent = dr.fma(sign, camera, lowest) + node.r * (segment * dr.rcp(whole))
+            return [density * exp_bounded(-exponent) * medium.phase.evaluate_half(node.down, node.up)]
+
+        return end, values, [after]
 
 
-def _roots(s, h):
-    """Return N and D, the square roots of (r + s)/2 and (r - s)/2 (see the module); 2 N D = h."""
-    larger = dr.sqrt(0.5 * (dr.abs(s) + dr.sqrt(dr.fma(s, s, h * h))))
-    smaller = 0.5 * h * dr.rcp(larger)
-    return dr.select(s > 0, larger, smaller), dr.select(s > 0, smaller, larger)
+def _root(fraction):
+    """Return the fourth root: a panel may have so many scale heights of what is a fraction of its integral."""
+    return dr.sqrt(dr.sqrt(fraction))
 
 
 def phi(u):

@@ -15,13 +15,15 @@ from typing import Any
 
 import drjit as dr
 
+from airlight.realtime.errors import InputError
 from airlight.realtime.numerics.array_types import is_single
-from airlight.realtime.numerics.functions import exp_bounded, unit_nodes
+from airlight.realtime.numerics.functions import exp_bounded
 from airlight.realtime.scene.lights import Light
+from airlight.realtime.scene.media.integrate import Node, Start, integral, panel_nodes
 from airlight.realtime.scene.phase import Phase
+from airlight.realtime.scene.rule_reach import CHANGE
 
 OPTICAL_REACH = 20.0  #: optical depths after which float32 has nothing left of light: e^-20 = 2e-9
-_NODES = 16  # of each part of a segment in a medium that has no integral of its own
 
 #: Returns the value of a phase function at the angle by which light is scattered.
 Angle = Callable[[Any], Any]
@@ -80,6 +82,18 @@ class Medium(ABC):
         """Return the optical depth of segments [m] of rays, by channel [1]; `x1` may be infinite."""
 
     @abstractmethod
+    def longest(self, rays: Rays, light: Light, x, change: float) -> Any:
+        """Return the longest panel that may begin at distances x [m]; it may be infinite.
+
+        In it the depth to the camera, the depth to the light and the logarithm of the extinction together change by no
+        more than `change`.
+        """
+
+    def bends(self, rays: Rays, light: Light) -> tuple[Any, ...]:
+        """Return the distances along rays at which the extinction or a depth has a kink [m]; by default none."""
+        return ()
+
+    @abstractmethod
     def length_of(self, depth: float) -> Any:
         """Return a length in which the optical depth grows by `depth` in every channel, wherever it lies [m]."""
 
@@ -128,6 +142,16 @@ class Medium(ABC):
     def ambient(self, rays: Rays, distance) -> Any:
         """Return the light of a constant field of radiance 1 in the medium up to a distance [m], RGB: 1 - exp(-tau)."""
         return self.albedo * (1 - self.transmittance(self.optical_depth(rays, 0, distance)))
+
+    def check_beam(self, axis, name: str) -> None:
+        """Refuse a light at infinity along a unit vector, on the host, that the medium does not let in.
+
+        Raises InputError, with the `name` of the light: by default for any.
+        """
+        raise InputError(
+            "the scene has a directional light and a medium without bounds, which lets nothing of it through from "
+            "infinity: needs media with bounds in vacuum; give the medium bounds, or use a 'point' or 'spot' light"
+        )
 
     @abstractmethod
     def thicker(self, factor: float) -> "Medium":
@@ -181,6 +205,9 @@ class VaryingMedium(Medium):
         """No: rays leave the medium, but `part` says where steps end."""
         return False
 
+    def check_beam(self, axis, name: str) -> None:
+        """Let all light in."""
+
     def length_of(self, depth: float) -> Any:
         """Return infinity: outside the medium it has any length."""
         return type(self.albedo.x)(dr.inf)
@@ -206,26 +233,71 @@ class LitRays:
 
     def airlight(self, x0, x1):
         """Return the integral over lit segments [x0, x1] [m], any that a light could reach; `x1` may be infinite."""
-        x0, x1 = self.geometry.lit_segment(x0, x1)
-        x1 = dr.minimum(x1, x0 + 2 * self.medium.length_of(OPTICAL_REACH))
-        total = self.nothing(dr.width(x0, x1))
-        for begin, end in self.geometry.smooth_subsegments(self.light, x0, x1):
-            foot = dr.clip(self.geometry.foot, begin, end) if self.light.w else begin
-            total += self._nodes(begin, foot) + self._nodes(foot, end)
-        return total
+        medium, rays = self.medium, self.rays
+        x0, x1 = self.within(*self.geometry.lit_segment(x0, x1))
+        return medium.transmittance(medium.optical_depth(rays, 0, x0)) * self.sum(integral(self, x0, x1))
 
-    def _nodes(self, x0, x1):
-        """Integrate by nodes in w = asinh((x - foot)/height), in which the integrand has no peak at the light."""
-        foot, height = self.geometry.foot, dr.maximum(self.geometry.height, 1e-12)
-        w0, w1 = (dr.asinh((x - foot) / height) for x in (x0, x1))
-        total = self.nothing(dr.width(x0, x1))
-        for fraction, weight in unit_nodes(_NODES):
-            if self.light.w:
-                w = dr.lerp(w0, w1, fraction)
-                total += self.source(dr.fma(height, dr.sinh(w), foot)) * (weight * (w1 - w0) * height * dr.cosh(w))
-            else:
-                total += self.source(dr.lerp(x0, x1, fraction)) * (weight * (x1 - x0))
-        return dr.select(x1 > x0, total, 0)
+    # The integrand, in the words of `realtime.scene.media.integrate`. A state is the optical depth, by channel, from
+    # where the segment begins to where a panel does.
+
+    @property
+    def most_panels(self) -> int:
+        """The number of panels of a segment that a frame does not refuse."""
+        return 200
+
+    def within(self, x0, x1) -> tuple[Any, Any]:
+        """Return the part of segments in which the medium scatters [m]."""
+        return self.medium.part(self.rays, x0, x1, uniform=False)
+
+    @property
+    def phase(self) -> Phase:
+        """The phase function whose lobe says how wide panels are."""
+        return self.medium.phase
+
+    def nodes(self, Float) -> int:
+        """Return how many nodes a panel has."""
+        return panel_nodes(Float)
+
+    def panel_width(self, Float) -> Any:
+        """Return how wide panels may be in ln E."""
+        return self.phase.width(Float)
+
+    def sum(self, totals: list[Any]) -> Any:
+        """Return the integral from the sums of `values`."""
+        return totals[0]
+
+    def bends(self) -> tuple[Any, ...]:
+        """Return the distances at which panels end [m]."""
+        return self.medium.bends(self.rays, self.light)
+
+    def zeros(self, width: int) -> list[Any]:
+        """Return the sums of nothing of some rays."""
+        return [self.nothing(width)]
+
+    def begin(self, x) -> Any:
+        """Return the state at the beginning of segments, x [m]."""
+        return [0 * x for _ in range(self.medium.channels)]
+
+    def shines(self, depths) -> Any:
+        """Return whether something is left of the light behind panels.
+
+        Twice the usual reach: out of thick fog the way to the light may lose more depth than the camera's gains.
+        """
+        return reduce(dr.minimum, depths) < 2 * optical_reach(type(depths[0]))
+
+    def panel(self, start: Start, depths) -> tuple[Any, Callable[[Node], list[Any]], Any]:
+        """Return the end of panels as s [m], the values at a node, and the state behind them."""
+        medium, rays, light = self.medium, self.rays, self.light
+
+        def after(x):
+            return [depth + more for depth, more in zip(depths, medium.optical_depth(rays, start.x, x), strict=True)]
+
+        def values(node: Node) -> list[Any]:
+            source = medium.source(rays, node.x, lambda phase: phase.evaluate_half(node.down, node.up))
+            return [source * medium.both_ways(rays, node.x, light, node.r, after(node.x))]
+
+        end = start.end(1 / medium.longest(rays, light, start.x, CHANGE))
+        return end, values, after(start.foot + end)
 
     def gamma(self, x):
         """Return Gamma(x), the airlight from the camera to a distance [m] (Biri 2006, section 4.2).
@@ -291,6 +363,10 @@ class Homogeneous(Medium):
         """Return `depth` over the smallest extinction [m]."""
         return depth / self.least_extinction()
 
+    def longest(self, rays, light, x, change):
+        """Return `change` over twice the largest extinction: to the light the way may grow as to the camera [m]."""
+        return change / (2 * reduce(dr.maximum, self.sigma_t))
+
     def depth_to_light(self, light, point, r, active=True):
         """Return sigma_t r [1]."""
         return tuple(sigma_t * r for sigma_t in self.sigma_t)
@@ -333,11 +409,6 @@ class HomogeneousRays(LitRays):
     def airlight(self, x0, x1):
         """Return J over the part of [x0, x1] [m] that the light's cone reaches [1/m]; valid where the kernel is."""
         return self.kernel(self.geometry, *self.geometry.lit_segment(x0, x1), self.medium, self.light)
-
-
-def unfinished(ends_early: Any, total: Any) -> Any:
-    """Return an integral, NaN where its loop over panels ended before its segment: a frame refuses such pixels."""
-    return dr.select(ends_early, dr.nan, total)
 
 
 def optical_reach(Float) -> float:

@@ -99,6 +99,9 @@ class Fog(Medium):
     def optical_depth(self, rays, x0, x1):
         return (self.sigma_t * (x1 - x0),)
 
+    def longest(self, rays, light, x, change):
+        return change / (2 * self.sigma_t)
+
     def length_of(self, depth):
         return depth / self.sigma_t
 
@@ -108,7 +111,7 @@ class Fog(Medium):
 
 @pytest.mark.parametrize("method", ["shadow-planes", "light-volumes", "ray-march", "froxel-fog", "soft-shafts"])
 def test_a_medium_of_two_functions(variant, method):
-    """16 nodes in w on each side of the foot, against the kernel; depths by segments, against one product."""
+    """Panels of any medium against the kernel; depths by segments, against one product."""
     place = mi.ScalarTransform4f().translate([0.1, 0.1, 0.7]).scale(0.3)
     box = {"type": "cube", "to_world": place, "bsdf": {"type": "diffuse"}}
     scene = read(tiny_scene(lamp=spot(beam=21.0), ball=box), "double")

@@ -21,6 +21,7 @@ from airlight.realtime.numerics.array_types import array_types
 from airlight.realtime.rays import ray_geometry
 from airlight.realtime.scene.lights import Light
 from airlight.realtime.scene.media.height_fog import HeightFog, Layer, phi
+from airlight.realtime.scene.media.medium import LitRays
 from airlight.realtime.scene.phase import HenyeyGreenstein
 from airlight.realtime.scene.read_scene import read_scene
 from airlight.reference.quadrature.image import quadrature_image
@@ -143,7 +144,7 @@ def test_sixteen_nodes_in_w(variant):
 
 def test_a_segment_whose_panels_run_out_is_not_dark(variant, monkeypatch):
     """A frame refuses what is not finite; a sum of some of the panels was a dark pixel in silence."""
-    monkeypatch.setattr("airlight.realtime.scene.media.height_fog._MOST", 1)
+    monkeypatch.setattr(LitRays, "most_panels", 1)
     errors = relative_errors(by_tag(*GENERIC), "double")
     finite = np.isfinite(errors)
     assert not finite.all()
