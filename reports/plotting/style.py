@@ -50,7 +50,7 @@ _METHODS = {
     # No chart has methods for fog and for clouds.
     "cloud-octaves": ("orange", "P"),
     "cloud-collectors": ("blue", "^"),
-    "cloud-collectors-2008": ("blue", "<"),
+    "cloud-collectors-2008": ("sky", "<"),
 }
 _HISTORY = "+history"  # ends the name of a method whose frames are averaged
 #: Colours and markers of all others: methods of users, and images of engines.
