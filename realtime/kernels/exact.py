@@ -52,6 +52,10 @@ panel, with F = E/d and C = sqrt(1 + F^2) there,
 are sums of positive terms, for its nodes and for its end, where the next begins. The extinctions of a coloured medium
 share all but the exponential: the range is that of the smallest, T that of the largest.
 
+Against the panels of any medium (`realtime.scene.media.integrate`), which differ by 4e-7 of the brightest pixel, this
+kernel takes half of the time in `open-fog` (26 and 57 ms, unshadowed, 400 x 300), where rays have no end, and a
+twentieth less in `hall` (288 and 303 ms, shadow planes, 800 x 600, 29 November 2026, processor time in turns).
+
 **Segments that are short** compared with their distance from the light have few nodes, in float32. Between the edges of
 shadows most segments are short. Over them the integrand of
 

@@ -29,7 +29,9 @@ Array = NDArray[np.float64]
 
 LEFT = 1e-6  #: of the integral over any panel
 PANEL_NODES, PANEL_DEPTH = 8, 10.5  #: of panels in v
-FEW_NODES, FEW_DEPTH = 4, 2.0  #: of short segments
+#: Of short segments, which save a ninth of a frame of `hall`: 318 for 357 ms of shadow planes at 800 x 600, processor
+#: time in turns (29 November 2026).
+FEW_NODES, FEW_DEPTH = 4, 2.0
 
 #: Nodes of panels of any medium, and how much depths and the logarithm of an extinction change together. Eight nodes
 #: and 6.0 took a tenth longer in `three-media` and as long in `street` (processor time of shadow planes, 320 x 240).
