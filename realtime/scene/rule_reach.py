@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 LEFT = 1e-6  #: of the integral over any panel
 PANEL_NODES, PANEL_DEPTH = 8, 10.5  #: of panels in v
-#: Of short segments, which save a ninth of a frame of `hall`: 318 for 357 ms of shadow planes at 800 x 600, processor
+#: Short segments save a ninth of a frame of `hall`: 318 for 357 ms of shadow planes at 800 x 600, processor
 #: time in turns (29 November 2026).
 FEW_NODES, FEW_DEPTH = 4, 2.0
 
